@@ -1,0 +1,153 @@
+//! What a user says about the piece of fabric that is simulated, and how finely.
+
+use super::fabric::Material;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The piece of fabric.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Domain {
+    /// A periodic cell of whole repeats: x spans `warps` warp pitches, y spans `wefts` weft pitches.
+    Cell {
+        /// Number of warp yarns, at least 2. Default 2.
+        #[serde(default = "warps")]
+        warps: usize,
+        /// Number of weft yarns: even (a tricot repeats after two courses), at least 2. Default 4.
+        #[serde(default = "wefts")]
+        wefts: usize,
+    },
+    /// A mesh written out in the case, for verification scenes.
+    Mesh(InlineMesh),
+}
+
+fn warps() -> usize {
+    2
+}
+fn wefts() -> usize {
+    4
+}
+
+/// Blocks of hexahedra and threads of beams, given node by node.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InlineMesh {
+    /// Structured blocks of 8-node hexahedra.
+    #[serde(default)]
+    pub blocks: Vec<InlineBlock>,
+    /// Chains of 2-node beams.
+    #[serde(default)]
+    pub threads: Vec<InlineThread>,
+    /// Coulomb friction coefficient of every contact. Default 0.
+    #[serde(default)]
+    pub friction: f64,
+    /// Conditions on nodes.
+    #[serde(default)]
+    pub conditions: Vec<Condition>,
+}
+
+/// A structured block: fibres run from slice to slice.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InlineBlock {
+    /// Name for messages and reports.
+    pub name: String,
+    /// Elements along the fibre, across it, and through the thickness: `[slices, columns, layers]`, each at least 1.
+    pub elements: [usize; 3],
+    /// Opposite corners of a straight block `[[x, y, z], [x, y, z]]`, mm: fibres along x, columns along y, layers along z.
+    /// Give either this or `nodes`.
+    #[serde(default)]
+    pub corners: Option<[[f64; 3]; 2]>,
+    /// Every node, mm, slices fastest, then columns, then layers.
+    #[serde(default)]
+    pub nodes: Option<Vec<[f64; 3]>>,
+    /// Fibre direction. Default `[1, 0, 0]`.
+    #[serde(default = "fibre")]
+    pub fibre: [f64; 3],
+    /// Density, tonne/mm³.
+    pub density_t_mm3: f64,
+    /// Constitutive law.
+    pub material: Material,
+    /// Velocity of every node at the start, mm/s. Default zero.
+    #[serde(default)]
+    pub velocity_mm_s: [f64; 3],
+}
+
+fn fibre() -> [f64; 3] {
+    [1.0, 0.0, 0.0]
+}
+
+/// A chain of 2-node beams.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InlineThread {
+    /// Name for messages and reports.
+    pub name: String,
+    /// Nodes in order, mm; at least 2.
+    pub nodes: Vec<[f64; 3]>,
+    /// Radius for contact, mm.
+    pub radius_mm: f64,
+    /// Axial stiffness EA, N.
+    pub axial_n: f64,
+    /// Bending stiffness, N·mm². Default 0.
+    #[serde(default)]
+    pub bending_n_mm2: f64,
+    /// Share of the given curvature that is stress-free, 0 to 1. Default 1.
+    #[serde(default = "rest_curvature")]
+    pub rest_curvature: f64,
+    /// Mass per length, tex (g/km).
+    pub linear_density_tex: f64,
+    /// Thermal strain at the end of a pretension step. Default 0.
+    #[serde(default)]
+    pub thermal_strain: f64,
+    /// Velocity of every node at the start, mm/s. Default zero.
+    #[serde(default)]
+    pub velocity_mm_s: [f64; 3],
+}
+
+fn rest_curvature() -> f64 {
+    1.0
+}
+
+/// Prescribed motion of the nodes of an inline mesh inside a box.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Condition {
+    /// Nodes whose reference position lies in this box `[[x, y, z], [x, y, z]]` (bounds included, 1e-6 mm tolerance), mm.
+    pub within: [[f64; 3]; 2],
+    /// Restrict to one block or thread, by name. Default: every body.
+    #[serde(default)]
+    pub body: Option<String>,
+    /// Which components are prescribed. Default all three.
+    #[serde(default = "all")]
+    pub components: [bool; 3],
+    /// Displacement at the end of the `move` steps, mm. Default zero: the nodes are held.
+    #[serde(default)]
+    pub displacement_mm: [f64; 3],
+}
+
+fn all() -> [bool; 3] {
+    [true; 3]
+}
+
+/// How finely the fabric is meshed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Resolution {
+    /// Hexahedra across a warp yarn. Default 18.
+    pub warp_columns: usize,
+    /// Hexahedra across a weft yarn. Default 8.
+    pub weft_columns: usize,
+    /// Hexahedra through the thickness of a yarn. Default 2.
+    pub layers: usize,
+    /// Length of a hexahedron along the fibre, mm; rounded to a whole number over the cell. Default 0.303.
+    pub slice_mm: f64,
+    /// Beams per lap (a loop and its underlap), graded by curvature. Default 60.
+    pub beams_per_lap: usize,
+}
+
+impl Default for Resolution {
+    fn default() -> Self {
+        Self { warp_columns: 18, weft_columns: 8, layers: 2, slice_mm: 0.303, beams_per_lap: 60 }
+    }
+}

@@ -1,0 +1,134 @@
+//! The effects of a scene. One that is absent leaves no buffer, no stage and no work.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Which effects the scene has, and the numerical parameters of each.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Effects {
+    /// Contact, by kind of pair. `null` turns it off.
+    pub contact: Option<Contact>,
+    /// Bending stiffness of threads. Default true.
+    pub bending: bool,
+    /// Damping of velocities. `null` turns it off.
+    pub damping: Option<Damping>,
+    /// Selective mass scaling along fibres and threads: lifts the limit that their axial stiffness sets on the time
+    /// step without resisting any rigid motion. `null` turns it off.
+    pub fibre_lines: Option<FibreLines>,
+    /// Nodal mass added only where and while contact or crushed elements would limit the time step. `null` turns it off.
+    pub contact_mass: Option<ContactMass>,
+    /// Floor on nodal mass, as a share of the body's mean nodal mass: light nodes at truncated edges and short beams. 0 turns it off. Default 0.5.
+    pub mass_floor: f64,
+    /// Gravity, mm/s². `null` (the default) turns it off.
+    pub gravity_mm_s2: Option<[f64; 3]>,
+}
+
+impl Default for Effects {
+    fn default() -> Self {
+        Self {
+            contact: Some(Contact::default()),
+            bending: true,
+            damping: Some(Damping::default()),
+            fibre_lines: Some(FibreLines::default()),
+            contact_mass: Some(ContactMass::default()),
+            mass_floor: 0.5,
+            gravity_mm_s2: None,
+        }
+    }
+}
+
+/// Penalty contact with Coulomb friction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Contact {
+    /// Threads against yarns. Default true.
+    pub thread_yarn: bool,
+    /// Yarns against yarns: ply on ply and lateral neighbours. Default true.
+    pub yarn_yarn: bool,
+    /// Threads against threads. Default true.
+    pub thread_thread: bool,
+    /// Penalty of a thread per length, N/mm². Default 140 (30 N/mm at a node of 0.22 mm).
+    pub thread_penalty_n_mm2: f64,
+    /// Penalty of a yarn surface per area, N/mm³. Default 65 (5 N/mm at a node of 0.078 mm²).
+    pub yarn_penalty_n_mm3: f64,
+    /// Coulomb friction with true stick. The coefficient belongs to the fabric. Default true.
+    pub friction: bool,
+    /// Tangential over normal penalty, above 0 to 1. Default 0.5.
+    pub tangential_ratio: f64,
+    /// Damping of the normal approach, as a share of critical. Default 0.1.
+    pub damping_ratio: f64,
+    /// Distance beyond touching at which pairs become candidates, mm. Default 0.06.
+    pub skin_mm: f64,
+    /// Beams of one thread closer than this along it do not touch each other, mm. Default 0.4.
+    pub self_contact_arc_mm: f64,
+    /// Contact radius of threads at the start of pre-tension over the full radius, above 0 to 1; it grows over the first
+    /// half of pre-tension. Below 1 for threads that start inside a yarn. Default 1.
+    pub initial_radius_ratio: f64,
+}
+
+impl Default for Contact {
+    fn default() -> Self {
+        Self {
+            thread_yarn: true,
+            yarn_yarn: true,
+            thread_thread: true,
+            thread_penalty_n_mm2: 140.0,
+            yarn_penalty_n_mm3: 65.0,
+            friction: true,
+            tangential_ratio: 0.5,
+            damping_ratio: 0.1,
+            skin_mm: 0.06,
+            self_contact_arc_mm: 0.4,
+            initial_radius_ratio: 1.0,
+        }
+    }
+}
+
+/// Mass-proportional damping. In a periodic cell it acts on the fluctuation, not on the affine motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Damping {
+    /// Rate for every node, 1/s. Default 2000.
+    pub rate_per_s: f64,
+    /// Rate for threads during pretension and settle steps, 1/s. Default 20000.
+    pub thread_settle_rate_per_s: f64,
+}
+
+impl Default for Damping {
+    fn default() -> Self {
+        Self { rate_per_s: 2000.0, thread_settle_rate_per_s: 2e4 }
+    }
+}
+
+/// Fibre-line selective mass scaling.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct FibreLines {
+    /// Strength β of the added inertia β dt² K; at least 0.25. Default 0.5.
+    pub beta: f64,
+    /// Also along threads. Default true.
+    pub threads: bool,
+}
+
+impl Default for FibreLines {
+    fn default() -> Self {
+        Self { beta: 0.5, threads: true }
+    }
+}
+
+/// Contact-aware nodal mass.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ContactMass {
+    /// Factor on the mass dt²/4·K that contact at a node calls for. Default 1.
+    pub factor: f64,
+    /// Share of the added mass that remains after each step once contact is lost, 0 to 1. Default 0.95.
+    pub memory: f64,
+}
+
+impl Default for ContactMass {
+    fn default() -> Self {
+        Self { factor: 1.0, memory: 0.95 }
+    }
+}

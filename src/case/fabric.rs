@@ -1,0 +1,156 @@
+//! What a user says about a fabric: yarns, stitch, materials, friction. Usually a file of its own, shared between cases.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A biaxial non-crimp fabric: two plies of straight yarns bound by a warp-knitted stitch.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Fabric {
+    /// Name for reports.
+    pub name: String,
+    /// Yarns along y, on the zig-zag face (z > 0).
+    pub warp: Yarn,
+    /// Yarns along x, on the looped face (z < 0).
+    pub weft: Yarn,
+    /// The thread that binds both plies.
+    pub stitch: Stitch,
+    /// Coulomb friction coefficient of every contact, 0 to 2. Paper: 0.2.
+    pub friction: f64,
+    /// Distance between the two plies before pre-tension, mm. Default 0.
+    #[serde(default)]
+    pub ply_gap_mm: f64,
+}
+
+/// Yarns of one ply: a straight extrusion of a truncated ellipse (Eq. 1 of the paper).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Yarn {
+    /// Distance between neighbouring yarns, centre to centre, mm.
+    pub pitch_mm: f64,
+    /// Width of the truncated section before pre-tension, mm.
+    pub width_mm: f64,
+    /// Thickness at the centre before pre-tension, mm.
+    pub thickness_mm: f64,
+    /// Truncated width over full width of the ellipse, 0.5 to 0.99. Default 0.95.
+    #[serde(default = "truncation")]
+    pub truncation: f64,
+    /// Mass of the ply per area, g/m². Sets the density, whatever the mesh. Paper: 300.
+    pub areal_mass_g_m2: f64,
+    /// Constitutive law of the yarn.
+    pub material: Material,
+}
+
+fn truncation() -> f64 {
+    0.95
+}
+
+/// Constitutive law of a yarn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Material {
+    /// Transversely isotropic hyperelastic law of fibre bundles (Charmetant et al.; Eqs 4 to 7 of the paper).
+    Charmetant {
+        /// Tensile stiffness along the fibres, MPa. Paper: 108500.
+        k_elong_mpa: f64,
+        /// Stiffness of cross-sectional compaction, MPa. Paper: 1.25.
+        k_comp_mpa: f64,
+        /// Exponent of cross-sectional compaction, above 1. Paper: 1.84.
+        p_comp: f64,
+        /// Transverse shear (distortion) stiffness, MPa. Paper: 0.6.
+        k_dist_mpa: f64,
+        /// Longitudinal shear stiffness, MPa. Paper: 2.2.
+        k_sh_mpa: f64,
+        /// Compaction |I_comp| below which the power is replaced by a parabola, since its tangent is infinite at
+        /// zero for exponents below 2. 0 turns it off. Default 1e-3.
+        #[serde(default = "compaction_cap")]
+        compaction_cap: f64,
+    },
+    /// Compressible neo-Hookean solid, for verification.
+    NeoHookean {
+        /// Young's modulus at small strain, MPa.
+        young_mpa: f64,
+        /// Poisson's ratio at small strain, 0 to 0.49.
+        poisson: f64,
+    },
+}
+
+fn compaction_cap() -> f64 {
+    1e-3
+}
+
+/// The stitch: one thread per wale.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stitch {
+    /// Knitting pattern.
+    #[serde(default)]
+    pub pattern: Pattern,
+    /// Whether the legs of a loop cross at its base.
+    #[serde(default)]
+    pub lap: Lap,
+    /// Radius of the thread's envelope, for contact, mm. Paper: 0.1.
+    pub radius_mm: f64,
+    /// Young's modulus on the area of the envelope, MPa: EA is the measured quantity. Paper: 350.
+    pub young_mpa: f64,
+    /// Bending stiffness, N·mm². Paper: 5.6e-4.
+    pub bending_n_mm2: f64,
+    /// Mass per length, tex (g/km). Only sets inertia. Default: 43.4, a solid polyester thread of 0.1 mm radius,
+    /// as in the paper; a real 76 dtex thread has 7.6.
+    #[serde(default = "linear_density")]
+    pub linear_density_tex: f64,
+    /// Thermal strain that tightens the stitch, additive (Eq. 14). Paper: −0.15.
+    pub thermal_strain: f64,
+    /// Share of the generated curvature that is stress-free: 1 threads rest as generated (as in Abaqus), 0 straight. Default 1.
+    #[serde(default = "rest_curvature")]
+    pub rest_curvature: f64,
+    /// Initial clearance between thread surface and yarn surface, mm. Default 0.01.
+    #[serde(default = "clearance_yarn")]
+    pub clearance_yarn_mm: f64,
+    /// Initial clearance between two thread surfaces, mm. Slack in the loops: it takes up part of the thermal strain. Default 0.03.
+    #[serde(default = "clearance_thread")]
+    pub clearance_thread_mm: f64,
+    /// Largest inward shift of the legs of a loop in the warp gap, mm. Default 0.12.
+    #[serde(default = "leg_shift")]
+    pub leg_shift_mm: f64,
+    /// Length over which an underlap turns from and into its legs, mm. Default 0.6.
+    #[serde(default = "underlap_ramp")]
+    pub underlap_ramp_mm: f64,
+}
+
+fn linear_density() -> f64 {
+    43.4
+}
+fn rest_curvature() -> f64 {
+    1.0
+}
+fn clearance_yarn() -> f64 {
+    0.01
+}
+fn clearance_thread() -> f64 {
+    0.03
+}
+fn leg_shift() -> f64 {
+    0.12
+}
+fn underlap_ramp() -> f64 {
+    0.6
+}
+
+/// Knitting pattern of the stitch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Pattern {
+    /// 1-0/1-2: every thread zig-zags between two wales.
+    #[default]
+    Tricot,
+}
+
+/// Closed laps cross their legs, open laps do not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Lap {
+    #[default]
+    Closed,
+    Open,
+}

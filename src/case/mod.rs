@@ -1,0 +1,51 @@
+//! What a user writes: a typed, checked JSON case.
+
+pub mod domain;
+pub mod effects;
+pub mod fabric;
+pub mod steps;
+
+use domain::{Domain, Resolution};
+use effects::Effects;
+use fabric::Fabric;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use steps::{Integration, Output, Step};
+
+/// A case: one run of `tricot`. Units: mm, N, s, tonne, MPa.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Case {
+    /// One line for reports.
+    pub title: String,
+    /// The fabric, inline or as the path of a file relative to the case. Needed by every domain but an inline mesh.
+    #[serde(default)]
+    pub fabric: Option<FabricSource>,
+    /// The piece of fabric.
+    pub domain: Domain,
+    /// How finely it is meshed.
+    #[serde(default)]
+    pub resolution: Resolution,
+    /// Effects, with their numerical parameters.
+    #[serde(default)]
+    pub effects: Effects,
+    /// Load steps.
+    pub steps: Vec<Step>,
+    /// Time integration.
+    #[serde(default)]
+    pub integration: Integration,
+    /// What is written.
+    #[serde(default)]
+    pub output: Output,
+}
+
+/// A fabric, or where to find it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum FabricSource {
+    /// Path of a fabric file, relative to the case file.
+    File(PathBuf),
+    /// The fabric itself.
+    Inline(Box<Fabric>),
+}

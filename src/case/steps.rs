@@ -1,0 +1,111 @@
+//! Load steps, in the order in which they are run.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// One load step. Every amplitude is smooth: it starts and ends with zero velocity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Step {
+    /// Nothing changes; the threads' settling damping acts.
+    Settle { time_s: f64 },
+    /// The stitch tightens to its thermal strain; contact radii grow to full size over the first half.
+    Pretension { time_s: f64 },
+    /// Nothing changes.
+    Hold { time_s: f64 },
+    /// Trellis shear of a periodic cell to `angle_deg`, from the angle before: F̄ = [[cos γ/2, sin γ/2], [sin γ/2, cos γ/2]].
+    Shear {
+        /// Shear angle at the end, degrees, −80 to 80.
+        angle_deg: f64,
+        time_s: f64,
+    },
+    /// The prescribed displacements of the conditions of an inline mesh grow to their full value.
+    Move { time_s: f64 },
+}
+
+impl Step {
+    /// Duration in s.
+    pub fn time(&self) -> f64 {
+        match *self {
+            Step::Settle { time_s }
+            | Step::Pretension { time_s }
+            | Step::Hold { time_s }
+            | Step::Shear { time_s, .. }
+            | Step::Move { time_s } => time_s,
+        }
+    }
+
+    /// Name as the user writes it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Step::Settle { .. } => "settle",
+            Step::Pretension { .. } => "pretension",
+            Step::Hold { .. } => "hold",
+            Step::Shear { .. } => "shear",
+            Step::Move { .. } => "move",
+        }
+    }
+}
+
+/// Time integration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Integration {
+    /// Time step: a fixed number of s, or `null` for the estimate times `safety`. Default null.
+    pub dt_s: Option<f64>,
+    /// Largest time step the estimate may reach, s. Default 5e-7.
+    pub dt_max_s: f64,
+    /// Factor on the estimated limit, above 0 to 1. Default 0.9.
+    pub safety: f64,
+    /// `f32` or `f64`. Default f32.
+    pub precision: Precision,
+    /// Relative error of the energy balance at which the run stops. Default 0.1.
+    pub energy_tolerance: f64,
+    /// Penetration at which the run stops, as a share of the thread radius (threads) or yarn thickness (yarns). Default 0.5.
+    pub penetration_tolerance: f64,
+    /// Offset of one node by so many position quanta (2⁻²³ mm) at the start: measures how far runs scatter by chance. Default 0.
+    pub perturbation_quanta: i32,
+}
+
+impl Default for Integration {
+    fn default() -> Self {
+        Self {
+            dt_s: None,
+            dt_max_s: 5e-7,
+            safety: 0.9,
+            precision: Precision::F32,
+            energy_tolerance: 0.1,
+            penetration_tolerance: 0.5,
+            perturbation_quanta: 0,
+        }
+    }
+}
+
+/// Scalar type of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    #[default]
+    F32,
+    F64,
+}
+
+/// What a run writes, and when.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Output {
+    /// Rows of the tables per load step. Default 200.
+    pub rows_per_step: usize,
+    /// Shear angles at which a frame (VTU) is written, degrees. A frame is also written at the start and at the end of every load step.
+    pub frames_at_deg: Vec<f64>,
+    /// Frames per load step besides. Default 0.
+    pub frames_per_step: usize,
+    /// Whether pictures are rendered of the frames. Default true.
+    pub pictures: bool,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self { rows_per_step: 200, frames_at_deg: vec![25.0], frames_per_step: 0, pictures: true }
+    }
+}

@@ -1,0 +1,85 @@
+//! The one error type. Every message names its culprit: the JSON path, the element or node, the value, and what to change.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Everything that can go wrong between a case file and its results.
+#[derive(Debug)]
+pub enum Error {
+    /// The case or fabric file does not say what `tricot` can run: `place` is a file and the JSON path inside it.
+    Case { place: String, message: String },
+    /// The parameters are valid one by one, but no fabric can be built from them.
+    Geometry { what: String, message: String },
+    /// A file or folder could not be read or written.
+    File { path: PathBuf, message: String },
+    /// The run was stopped by a guard; the message holds the step, the element or node, the value and advice.
+    Guard(Guard),
+    /// A request that this build or machine cannot serve.
+    Unsupported(String),
+}
+
+/// Why a guard stopped a run. Results up to the last output before it stay on disk.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Guard {
+    /// Short name, such as `non-finite`, `inversion`, `energy`, `contact overflow`.
+    pub cause: String,
+    /// Step number at which it was noticed.
+    pub step: u64,
+    /// Time in s.
+    pub time: f64,
+    /// Which element, node or pair, with values.
+    pub culprit: String,
+    /// What a user can change.
+    pub advice: String,
+}
+
+/// Result with the crate's error.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// An error at a JSON path of a case.
+    pub fn case(place: impl Into<String>, message: impl Into<String>) -> Self {
+        Error::Case { place: place.into(), message: message.into() }
+    }
+
+    /// An error of the generated geometry.
+    pub fn geometry(what: impl Into<String>, message: impl Into<String>) -> Self {
+        Error::Geometry { what: what.into(), message: message.into() }
+    }
+
+    /// An error of the file system at `path`.
+    pub fn file(path: impl AsRef<Path>, source: impl fmt::Display) -> Self {
+        Error::File { path: path.as_ref().to_path_buf(), message: source.to_string() }
+    }
+
+    /// Exit code of the program: 2 bad input, 3 stopped by a guard, 4 files, 5 unsupported.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Case { .. } | Error::Geometry { .. } => 2,
+            Error::Guard(_) => 3,
+            Error::File { .. } => 4,
+            Error::Unsupported(_) => 5,
+        }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Case { place, message } => write!(f, "{place}: {message}"),
+            Error::Geometry { what, message } => write!(f, "{what}: {message}"),
+            Error::File { path, message } => write!(f, "{}: {message}", path.display()),
+            Error::Guard(guard) => write!(f, "{guard}"),
+            Error::Unsupported(message) => f.write_str(message),
+        }
+    }
+}
+
+impl fmt::Display for Guard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Guard { cause, step, time, culprit, advice } = self;
+        write!(f, "stopped by the {cause} guard at step {step} (t = {time:.6e} s): {culprit}; {advice}")
+    }
+}
+
+impl std::error::Error for Error {}
