@@ -3,3 +3,7 @@
 pub mod case;
 pub mod error;
 pub mod mesh;
+pub mod kernel;
+pub mod materials; pub mod elements;
+pub mod dynamics; pub mod conditions;
+pub mod contact;

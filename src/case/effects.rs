@@ -52,6 +52,8 @@ pub struct Contact {
     pub thread_penalty_n_mm2: f64,
     /// Penalty of a yarn surface per area, N/mm³. Default 65 (5 N/mm at a node of 0.078 mm²).
     pub yarn_penalty_n_mm3: f64,
+    /// Penalty of a pair of beams, N/mm. Default 30.
+    pub thread_thread_penalty_n_mm: f64,
     /// Coulomb friction with true stick. The coefficient belongs to the fabric. Default true.
     pub friction: bool,
     /// Tangential over normal penalty, above 0 to 1. Default 0.5.
@@ -75,6 +77,7 @@ impl Default for Contact {
             thread_thread: true,
             thread_penalty_n_mm2: 140.0,
             yarn_penalty_n_mm3: 65.0,
+            thread_thread_penalty_n_mm: 30.0,
             friction: true,
             tangential_ratio: 0.5,
             damping_ratio: 0.1,

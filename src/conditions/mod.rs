@@ -1,0 +1,3 @@
+//! Conditions on nodes of free scenes.
+
+pub mod prescribed;

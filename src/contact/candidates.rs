@@ -1,0 +1,201 @@
+//! Candidates of each slave node: for every body and image within reach, the face that is closest.
+//!
+//! Among the faces of a body the closest one in front of which the slave lies wins; one behind which it lies only if it is
+//! clearly closer, since at a sharp edge the slave is behind the neighbouring face without being inside the body. A
+//! candidate that was known keeps its friction, and its face while it touches.
+
+use super::face::{Place, Surface, closest};
+use super::grid::{BOX, absolute, cell_index, cells, inverse};
+use super::penalty::{SLAVE, SLAVE_VALUES, SLOT_KEYS, SLOT_STATE};
+use super::{EMPTY, Params, key, status};
+use crate::kernel::lane::{Lane, Real};
+use crate::kernel::node::{Displacements, Lattice};
+use crate::kernel::position::QUANTUM;
+use crate::kernel::stage::{Io, Kernel};
+use crate::kernel::vector::{add, dot, norm, scale, sub};
+use std::ops::Range;
+use std::sync::atomic::Ordering;
+
+pub const SLAVES: usize = 0;
+pub const VALUES: usize = 1;
+pub const SLABS: usize = 2;
+pub const BODIES: usize = 3;
+pub const RING_LINES: usize = 4;
+pub const REFERENCE: usize = 5;
+pub const QUANTA: usize = 6;
+pub const REMAINDER: usize = 7;
+pub const COUNTS: usize = 8;
+pub const ITEMS: usize = 9;
+pub const BOXES: usize = 10;
+const KEYS: usize = 11;
+const STATE: usize = 12;
+const STATUS: usize = 13;
+
+/// Bodies that one slave can be near to before the search gives up.
+const MOST: usize = 16;
+/// A face behind which the slave lies must be closer than one in front by this, mm.
+const CLEARLY: f64 = 0.01;
+
+/// The search.
+pub struct Candidates;
+
+/// The best faces of one body found so far.
+#[derive(Clone, Copy)]
+struct Best<R> {
+    key: u32,
+    in_front: (R, Place),
+    behind: (R, Place),
+}
+
+impl Kernel for Candidates {
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let params: Params = io.params();
+        let constant = L::Scalar::from_f64;
+        let surface = Surface {
+            bodies: bytemuck::cast_slice(io.uints(BODIES)),
+            ring_lines: io.uints(RING_LINES),
+            reference: Lattice::new(io, REFERENCE),
+            displacement: Displacements::new(io, QUANTA, REMAINDER),
+            gradient: &io.row.gradient,
+            period: params.period,
+        };
+        let inverse = inverse(&io.row.gradient);
+        let (slaves, values, slabs) = (io.uints(SLAVES), io.scalars(VALUES), io.uints(SLABS));
+        let (counts, lists, boxes) = (io.uints(COUNTS), io.uints(ITEMS), io.scalars(BOXES));
+        let mut keys = io.own::<u32>(KEYS);
+        let mut states = io.own::<L::Scalar>(STATE);
+        let flags = io.atomic_uints(STATUS);
+        let period = params.period.map(|p| L::Scalar::from_i32(p) * constant(QUANTUM));
+        let far = constant(1e9);
+        let nowhere = Place { ring: 0, slice: 0 };
+        for item in items {
+            let slave = slaves[SLAVE * item] as usize;
+            let own = slaves[SLAVE * item + 1];
+            let reach = values[SLAVE_VALUES * item + 1] + constant(f64::from(params.skin));
+            let (position, height) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, slave);
+            let mut found = [Best { key: EMPTY, in_front: (far, nowhere), behind: (far, nowhere) }; MOST];
+            let mut count = 0;
+            if position[0].is_finite() && position[1].is_finite() && height.is_finite() {
+                let (x, _) = cells(&params, 0, position[0], position[0]);
+                let (y, _) = cells(&params, 1, position[1], position[1]);
+                let cell = cell_index(&params, x, y);
+                let listed = counts[cell].min(params.capacity) as usize;
+                for &near in &lists[cell * params.capacity as usize..][..listed] {
+                    if near >= params.slabs {
+                        continue;
+                    }
+                    let (body, slice) = (slabs[2 * near as usize], slabs[2 * near as usize + 1] as i32);
+                    let bounds = &boxes[BOX * near as usize..][..BOX];
+                    if body == own || height < bounds[2] - reach || height > bounds[3] + reach {
+                        continue;
+                    }
+                    let image = [0, 1].map(|k| {
+                        if params.period[k] == 0 { 0 } else { ((position[k] - bounds[k]) / period[k]).to_i32() }
+                    });
+                    // a closed yarn goes on through its own images: count its slices on instead
+                    let b = surface.bodies[body as usize];
+                    let turns = image[0] * b.wrap[0] + image[1] * b.wrap[1];
+                    let lateral = [image[0] - turns * b.wrap[0], image[1] - turns * b.wrap[1]];
+                    let slice = slice + turns * b.slices as i32;
+                    let key = key(body as usize, lateral);
+                    let mut best = Best { key, in_front: (far, nowhere), behind: (far, nowhere) };
+                    let place = |ring| Place { ring, slice };
+                    let across = |ring: i32| {
+                        let end = |slice| {
+                            let (node, shift) = surface.node(body as usize, lateral, Place { ring, slice });
+                            surface.from_slave(slave, node, shift).1
+                        };
+                        (end(slice), end(slice + 1))
+                    };
+                    let mut here = across(0);
+                    for ring in 0..b.ring as i32 {
+                        let next = across(ring + 1);
+                        let corners = [here.0, here.1, next.1, next.0];
+                        here = next;
+                        let (d1, d2) = (sub(corners[2], corners[0]), sub(corners[3], corners[1]));
+                        let middle = scale(add(add(corners[0], corners[1]), add(corners[2], corners[3])), constant(0.25));
+                        let spread = constant(0.5) * norm(d1).max(norm(d2));
+                        if norm(middle) > reach + spread * constant(1.1) {
+                            continue;
+                        }
+                        let point = closest(&corners);
+                        if point.distance > reach {
+                            continue;
+                        }
+                        let in_front = dot(point.offset, point.normal) >= constant(0.0);
+                        if in_front {
+                            best.in_front = nearer(best.in_front, (point.distance, place(ring)));
+                        } else if point.normal_and_distance().is_some() {
+                            best.behind = nearer(best.behind, (point.distance, place(ring)));
+                        }
+                    }
+                    if best.in_front.0 == far && best.behind.0 == far {
+                        continue;
+                    }
+                    match found[..count].iter_mut().find(|f| f.key == key) {
+                        Some(known) => {
+                            known.in_front = nearer(known.in_front, best.in_front);
+                            known.behind = nearer(known.behind, best.behind);
+                        }
+                        None if count < MOST => {
+                            found[count] = best;
+                            count += 1;
+                        }
+                        None => {
+                            flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
+                        }
+                    }
+                }
+            } else {
+                flags[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
+            }
+            let found = &mut found[..count];
+            found.sort_unstable_by_key(|f| f.key);
+            if count > params.slots as usize {
+                flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
+            }
+            let kept = found.len().min(params.slots as usize);
+            merge(keys.item(0, item), states.item(0, item), &found[..kept]);
+        }
+    }
+}
+
+/// The nearer of two faces; of equally near ones that with the smaller number, so that the order of visits does not matter.
+#[inline(always)]
+fn nearer<R: Real>(a: (R, Place), b: (R, Place)) -> (R, Place) {
+    let order = |p: Place| (p.slice, p.ring);
+    if b.0 < a.0 || b.0 == a.0 && order(b.1) < order(a.1) { b } else { a }
+}
+
+/// Writes new candidates into the slots; known ones keep their friction, and their face while they touch.
+#[inline(always)]
+fn merge<R: Real>(keys: &mut [u32], states: &mut [R], found: &[Best<R>]) {
+    let zero = R::from_f64(0.0);
+    let mut old = [(EMPTY, 0u32, 0u32, [zero; SLOT_STATE]); MOST];
+    let slots = keys.len() / SLOT_KEYS;
+    let known = slots.min(MOST);
+    for (slot, old) in old[..known].iter_mut().enumerate() {
+        let (k, s) = (&keys[SLOT_KEYS * slot..], &states[SLOT_STATE * slot..]);
+        *old = (k[0], k[1], k[2], [s[0], s[1], s[2], s[3]]);
+    }
+    for slot in 0..slots {
+        let (k, s) = (&mut keys[SLOT_KEYS * slot..][..SLOT_KEYS], &mut states[SLOT_STATE * slot..][..SLOT_STATE]);
+        let Some(best) = found.get(slot) else {
+            k.fill(EMPTY);
+            s.fill(zero);
+            continue;
+        };
+        let clearly = best.behind.0 + R::from_f64(CLEARLY);
+        let place = if clearly < best.in_front.0 { best.behind.1 } else { best.in_front.1 };
+        let mut now = (best.key, place.ring as u32, place.slice as u32, [zero; SLOT_STATE]);
+        if let Some(old) = old[..known].iter().find(|old| old.0 == best.key) {
+            now.3 = old.3;
+            if old.3[3] > zero {
+                (now.1, now.2) = (old.1, old.2);
+            }
+        }
+        k.copy_from_slice(&[now.0, now.1, now.2]);
+        s.copy_from_slice(&now.3);
+    }
+}

@@ -1,0 +1,221 @@
+//! A face of a structured surface seen from a slave point: closest point on a bilinear patch, and the walk over the surface.
+
+use super::Body;
+use crate::kernel::lane::Real;
+use crate::kernel::node::{Displacements, Lattice};
+use crate::kernel::vector::{Vector, add, apply, cross, dot, fma, norm, scale, sub};
+
+/// Geometry that all faces share.
+pub struct Surface<'a, R> {
+    pub bodies: &'a [Body],
+    /// First node of the fibre line at each ring position of each body.
+    pub ring_lines: &'a [u32],
+    pub reference: Lattice<'a>,
+    pub displacement: Displacements<'a, R>,
+    /// F̄ − I.
+    pub gradient: &'a [[R; 3]; 3],
+    /// Periods in quanta.
+    pub period: [i32; 2],
+}
+
+/// Where on a surface: ring position, and slice counted on through periodic images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    pub ring: i32,
+    pub slice: i32,
+}
+
+/// The corners of a face relative to the slave: in the reference and now, in the order (r, s), (r, s+1), (r+1, s+1), (r+1, s).
+pub struct Corners<R> {
+    pub nodes: [usize; 4],
+    pub reference: [Vector<R>; 4],
+    pub current: [Vector<R>; 4],
+}
+
+/// The point of a face closest to the slave.
+pub struct Closest<R> {
+    /// Coordinates on the face, −1 to 1: along the slice and along the ring.
+    pub xi: R,
+    pub eta: R,
+    /// From the closest point to the slave, mm.
+    pub offset: Vector<R>,
+    pub distance: R,
+    /// Outward unit normal of the face there.
+    pub normal: Vector<R>,
+    /// Whether the point lies inside the face rather than on its border.
+    pub interior: bool,
+}
+
+impl<R: Real> Surface<'_, R> {
+    /// A node of a body's surface, and its image shift in quanta.
+    #[inline(always)]
+    pub fn node(&self, body: usize, image: [i32; 2], place: Place) -> (usize, [i32; 2]) {
+        let b = self.bodies[body];
+        let line = self.ring_lines[(b.ring_start + place.ring.rem_euclid(b.ring as i32) as u32) as usize] as usize;
+        let mut image = image;
+        let mut slice = place.slice;
+        if b.closed == 1 {
+            let turns = slice.div_euclid(b.slices as i32);
+            slice -= turns * b.slices as i32;
+            image = [image[0] + turns * b.wrap[0], image[1] + turns * b.wrap[1]];
+        }
+        (line + slice as usize, [image[0].wrapping_mul(self.period[0]), image[1].wrapping_mul(self.period[1])])
+    }
+
+    /// Reference and current position of a surface node relative to the slave node.
+    #[inline(always)]
+    pub fn from_slave(&self, slave: usize, node: usize, shift: [i32; 2]) -> (Vector<R>, Vector<R>) {
+        let rest: Vector<R> = self.reference.between(node, slave, shift);
+        let current = add(add(rest, apply(self.gradient, rest)), self.displacement.between(node, slave));
+        (rest, current)
+    }
+
+    /// The corners of a face.
+    #[inline(always)]
+    pub fn corners(&self, slave: usize, body: usize, image: [i32; 2], place: Place) -> Corners<R> {
+        let zero = [R::from_f64(0.0); 3];
+        let mut corners = Corners { nodes: [0; 4], reference: [zero; 4], current: [zero; 4] };
+        for (a, (ring, slice)) in [(0, 0), (0, 1), (1, 1), (1, 0)].into_iter().enumerate() {
+            let at = Place { ring: place.ring + ring, slice: place.slice + slice };
+            let (node, shift) = self.node(body, image, at);
+            corners.nodes[a] = node;
+            (corners.reference[a], corners.current[a]) = self.from_slave(slave, node, shift);
+        }
+        corners
+    }
+
+    /// Walks from a face to the one closest to the slave. Ends on a face, or on the edge between two faces that each point to the other.
+    #[inline(always)]
+    pub fn walk(&self, slave: usize, body: usize, image: [i32; 2], from: Place) -> (Place, Corners<R>, Closest<R>) {
+        let b = self.bodies[body];
+        let one = R::from_f64(1.0);
+        let mut place = from;
+        let mut before = from;
+        let mut corners = self.corners(slave, body, image, place);
+        for _ in 0..8 {
+            let (xi, eta) = project(&corners.current);
+            let (over_xi, over_eta) = (xi.abs() - one, eta.abs() - one);
+            let zero = R::from_f64(0.0);
+            let mut next = place;
+            if over_eta > zero && over_eta >= over_xi {
+                next.ring += if eta > zero { 1 } else { -1 };
+            } else if over_xi > zero {
+                next.slice += if xi > zero { 1 } else { -1 };
+                if b.closed == 0 {
+                    next.slice = next.slice.clamp(0, b.slices as i32 - 1);
+                    if next == place && over_eta > zero {
+                        next.ring += if eta > zero { 1 } else { -1 };
+                    }
+                }
+            }
+            if next == place || next == before && place != from {
+                break;
+            }
+            (before, place) = (place, next);
+            corners = self.corners(slave, body, image, place);
+        }
+        let closest = closest(&corners.current);
+        place.ring = place.ring.rem_euclid(b.ring as i32);
+        (place, corners, closest)
+    }
+}
+
+/// Middle and derivatives of a bilinear patch.
+#[inline(always)]
+fn patch<R: Real>(q: &[Vector<R>; 4]) -> [Vector<R>; 4] {
+    let quarter = R::from_f64(0.25);
+    let (s01, s23) = (add(q[0], q[1]), add(q[2], q[3]));
+    let (d01, d32) = (sub(q[1], q[0]), sub(q[2], q[3]));
+    [scale(add(s01, s23), quarter), scale(add(d01, d32), quarter), scale(sub(s23, s01), quarter), scale(sub(d32, d01), quarter)]
+}
+
+/// Point of a patch.
+#[inline(always)]
+fn at<R: Real>(p: &[Vector<R>; 4], xi: R, eta: R) -> Vector<R> {
+    fma(p[3], xi * eta, fma(p[2], eta, fma(p[1], xi, p[0])))
+}
+
+/// Coordinates of the closest point of the unbounded patch to the origin, kept within ±2.
+#[inline(always)]
+pub fn project<R: Real>(q: &[Vector<R>; 4]) -> (R, R) {
+    let p = patch(q);
+    let (zero, two) = (R::from_f64(0.0), R::from_f64(2.0));
+    let (mut xi, mut eta) = (zero, zero);
+    for _ in 0..3 {
+        let (t1, t2) = (fma(p[3], eta, p[1]), fma(p[3], xi, p[2]));
+        let r = at(&p, xi, eta);
+        let (g11, g12, g22) = (dot(t1, t1), dot(t1, t2), dot(t2, t2));
+        let (b1, b2) = (dot(t1, r), dot(t2, r));
+        let inverse = R::from_f64(1.0) / (g11 * g22 - g12 * g12).max(R::from_f64(1e-20));
+        let (dx, dy) = ((g12 * b2 - g22 * b1) * inverse, (g12 * b1 - g11 * b2) * inverse);
+        xi = (xi + dx).min(two).max(-two);
+        eta = (eta + dy).min(two).max(-two);
+        if dx.abs() + dy.abs() < R::from_f64(1e-4) {
+            break;
+        }
+    }
+    (xi, eta)
+}
+
+/// The closest point of a face to the origin, where the slave is.
+#[inline(always)]
+pub fn closest<R: Real>(q: &[Vector<R>; 4]) -> Closest<R> {
+    let p = patch(q);
+    let one = R::from_f64(1.0);
+    let (mut xi, mut eta) = project(q);
+    let interior = xi.abs() <= one && eta.abs() <= one;
+    if !interior {
+        // on the border: best along each edge that the projection left through
+        let along_eta = |xi: R| {
+            let (o, t) = (fma(p[1], xi, p[0]), fma(p[3], xi, p[2]));
+            (-dot(o, t) / dot(t, t)).min(one).max(-one)
+        };
+        let along_xi = |eta: R| {
+            let (o, t) = (fma(p[2], eta, p[0]), fma(p[3], eta, p[1]));
+            (-dot(o, t) / dot(t, t)).min(one).max(-one)
+        };
+        let (cx, cy) = (xi.min(one).max(-one), eta.min(one).max(-one));
+        let first = (cx, along_eta(cx));
+        let second = (along_xi(cy), cy);
+        let square = |(xi, eta): (R, R)| {
+            let r = at(&p, xi, eta);
+            dot(r, r)
+        };
+        (xi, eta) = match (xi.abs() > one, eta.abs() > one) {
+            (true, false) => first,
+            (false, true) => second,
+            _ if square(second) < square(first) => second,
+            _ => first,
+        };
+    }
+    let offset = scale(at(&p, xi, eta), -one);
+    let n = cross(fma(p[3], xi, p[2]), fma(p[3], eta, p[1]));
+    let normal = scale(n, one / norm(n).max(R::from_f64(1e-20)));
+    Closest { xi, eta, offset, distance: norm(offset), normal, interior }
+}
+
+impl<R: Real> Closest<R> {
+    /// Direction in which the slave is pushed, and signed distance of the slave point from the surface, mm; `None` where the
+    /// point lies beside the border of a face it has passed under.
+    #[inline(always)]
+    pub fn normal_and_distance(&self) -> Option<(Vector<R>, R)> {
+        let height = dot(self.offset, self.normal);
+        let zero = R::from_f64(0.0);
+        if self.interior {
+            return Some((self.normal, height));
+        }
+        let tiny = self.distance < R::from_f64(1e-6);
+        if height >= zero {
+            return Some(if tiny { (self.normal, height) } else { (scale(self.offset, R::from_f64(1.0) / self.distance), self.distance) });
+        }
+        (-height > R::from_f64(0.7) * self.distance).then_some((self.normal, -self.distance))
+    }
+
+    /// Weights of the four corners.
+    #[inline(always)]
+    pub fn weights(&self) -> [R; 4] {
+        let (one, quarter) = (R::from_f64(1.0), R::from_f64(0.25));
+        let (a, b, c, d) = (one - self.xi, one + self.xi, one - self.eta, one + self.eta);
+        [quarter * a * c, quarter * b * c, quarter * b * d, quarter * a * d]
+    }
+}

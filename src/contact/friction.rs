@@ -1,0 +1,31 @@
+//! Coulomb friction with true stick: an elastic tangential displacement t that is carried along, turned into the tangent
+//! plane, and cut where its force would exceed μ times the normal force. A pair at rest keeps its force for ever; nothing creeps.
+
+use crate::kernel::lane::Real;
+use crate::kernel::vector::{Vector, add, dot, fma, scale, sub};
+
+/// What one step of sliding leaves.
+pub struct Slide<R> {
+    /// Elastic tangential displacement, mm; the force is −k_t t.
+    pub elastic: Vector<R>,
+    /// Distance slid, mm.
+    pub slip: R,
+    /// Energy lost, mJ.
+    pub dissipated: R,
+}
+
+/// Advances the tangential displacement `elastic` by `motion` (relative motion over the step, mm) on a surface with unit normal
+/// `normal`, tangential stiffness `stiffness` (N/mm) and largest force `limit` (N).
+#[inline(always)]
+pub fn slide<R: Real>(elastic: Vector<R>, motion: Vector<R>, normal: Vector<R>, stiffness: R, limit: R) -> Slide<R> {
+    let flat = |a: Vector<R>| fma(normal, -dot(normal, a), a);
+    let turned = flat(elastic);
+    let trial = add(turned, flat(motion));
+    let size = dot(trial, trial).sqrt();
+    let held = size * stiffness;
+    let half = R::from_f64(0.5) * stiffness;
+    let new = if held > limit { scale(trial, limit / held) } else { trial };
+    let gone = sub(trial, new);
+    let lost = (dot(elastic, elastic) - dot(turned, turned)) + (dot(trial, trial) - dot(new, new));
+    Slide { elastic: new, slip: dot(gone, gone).sqrt(), dissipated: half * lost }
+}

@@ -1,0 +1,165 @@
+//! The grid of the contact search: slabs of yarns (one slice of one yarn) and beams, each in every cell that its box touches.
+//!
+//! Cells are taken in the pulled-back plane F̄⁻¹x, where the periodic cell keeps its rectangle; a distance ρ in space is at
+//! most ρ |row of F̄⁻¹| along an axis there. A cell lists its items in any order: what is chosen from them does not depend on it.
+
+use super::face::{Place, Surface};
+use super::{Params, status};
+use crate::elements::beam2;
+use crate::kernel::lane::{Lane, Real};
+use crate::kernel::node::{Displacements, Lattice};
+use crate::kernel::position::QUANTUM;
+use crate::kernel::stage::{Io, Kernel};
+use std::ops::Range;
+use std::sync::atomic::Ordering;
+
+/// Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm.
+pub const BOX: usize = 4;
+
+/// Body and slice of each slab.
+pub const SLABS: usize = 0;
+pub const BODIES: usize = 1;
+pub const RING_LINES: usize = 2;
+pub const REFERENCE: usize = 3;
+pub const QUANTA: usize = 4;
+pub const REMAINDER: usize = 5;
+pub const ENDS: usize = 6;
+pub const BEAMS: usize = 7;
+const COUNTS: usize = 8;
+const ITEMS: usize = 9;
+const BOXES: usize = 10;
+const STATUS: usize = 11;
+
+/// Empties the cells.
+pub struct Clear;
+/// Puts slabs and beams into cells.
+pub struct Fill;
+
+impl Kernel for Clear {
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let mut counts = io.own::<u32>(0);
+        for cell in items {
+            *counts.at(0, cell) = 0;
+        }
+    }
+}
+
+/// The in-plane inverse of F̄.
+#[inline(always)]
+pub fn inverse<R: Real>(gradient: &[[R; 3]; 3]) -> [[R; 2]; 2] {
+    let one = R::from_f64(1.0);
+    let (a, b, c, d) = (one + gradient[0][0], gradient[0][1], gradient[1][0], one + gradient[1][1]);
+    let scale = one / (a * d - b * c);
+    [[d * scale, -(b * scale)], [-(c * scale), a * scale]]
+}
+
+/// A vector in the pulled-back plane.
+#[inline(always)]
+pub fn pull_back<R: Real>(inverse: &[[R; 2]; 2], v: [R; 3]) -> [R; 2] {
+    [inverse[0][0] * v[0] + inverse[0][1] * v[1], inverse[1][0] * v[0] + inverse[1][1] * v[1]]
+}
+
+/// Where a node is: pulled-back plane and height, mm. For the grid only; contact works with differences.
+#[inline(always)]
+pub fn absolute<R: Real>(io: &Io<R>, bindings: [usize; 3], inverse: &[[R; 2]; 2], node: usize) -> ([R; 2], R) {
+    let [reference, quanta, remainder] = bindings;
+    let (reference, quanta, remainder) = (io.ints(reference), io.ints(quanta), io.scalars(remainder));
+    let plane = remainder.len() / 3;
+    let mm = |q: i32| R::from_i32(q) * R::from_f64(QUANTUM);
+    let w = [0, 1, 2].map(|k| mm(quanta[node + k * plane]) + remainder[node + k * plane]);
+    let back = pull_back(inverse, w);
+    ([mm(reference[node]) + back[0], mm(reference[node + plane]) + back[1]], mm(reference[node + 2 * plane]) + w[2])
+}
+
+/// First and last cell along one axis for an interval of the pulled-back plane; the last may lie behind the first by whole periods.
+#[inline(always)]
+pub fn cells<R: Real>(params: &Params, axis: usize, low: R, high: R) -> (i32, i32) {
+    let cell = |x: R| {
+        let x = (x.to_f64() - f64::from(params.origin[axis])) / f64::from(params.cell[axis]);
+        libm::floor(x.clamp(-1e6, 1e6)) as i32
+    };
+    let (low, high, count) = (cell(low), cell(high), params.cells[axis] as i32);
+    if params.period[axis] != 0 { (low, high.min(low + count - 1)) } else { (low.clamp(0, count - 1), high.clamp(0, count - 1)) }
+}
+
+/// Number of a cell.
+#[inline(always)]
+pub fn cell_index(params: &Params, x: i32, y: i32) -> usize {
+    let (nx, ny) = (params.cells[0] as i32, params.cells[1] as i32);
+    (y.rem_euclid(ny) * nx + x.rem_euclid(nx)) as usize
+}
+
+impl Kernel for Fill {
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let params: Params = io.params();
+        let real = |x: f32| L::Scalar::from_f64(f64::from(x));
+        let (counts, flags) = (io.atomic_uints(COUNTS), io.atomic_uints(STATUS));
+        let mut lists = io.scatter::<u32>(ITEMS);
+        let mut boxes = io.own::<L::Scalar>(BOXES);
+        let inverse = inverse(&io.row.gradient);
+        let surface = Surface {
+            bodies: bytemuck::cast_slice(io.uints(BODIES)),
+            ring_lines: io.uints(RING_LINES),
+            reference: Lattice::new(io, REFERENCE),
+            displacement: Displacements::new(io, QUANTA, REMAINDER),
+            gradient: &io.row.gradient,
+            period: params.period,
+        };
+        let (slabs, ends, beams) = (io.uints(SLABS), io.uints(ENDS), io.scalars(BEAMS));
+        for item in items {
+            let origin;
+            let mut low = [L::Scalar::from_f64(0.0); 3];
+            let mut high = low;
+            let mut grow = |v: [L::Scalar; 3]| {
+                let back = pull_back(&inverse, v);
+                for (k, x) in [back[0], back[1], v[2]].into_iter().enumerate() {
+                    low[k] = low[k].min(x);
+                    high[k] = high[k].max(x);
+                }
+            };
+            let reach = if item < params.slabs as usize {
+                let (body, slice) = (slabs[2 * item] as usize, slabs[2 * item + 1] as i32);
+                origin = surface.node(body, [0, 0], Place { ring: 0, slice }).0;
+                for ring in 0..surface.bodies[body].ring as i32 {
+                    for slice in [slice, slice + 1] {
+                        let (node, shift) = surface.node(body, [0, 0], Place { ring, slice });
+                        grow(surface.from_slave(origin, node, shift).1);
+                    }
+                }
+                real(params.thread_radius + params.skin)
+            } else {
+                let beam = item - params.slabs as usize;
+                origin = ends[2 * beam] as usize;
+                let (d, change) = beam2::vector(beams, ends, beam, &surface.displacement, &io.row.gradient);
+                grow([d[0] + change[0], d[1] + change[1], d[2] + change[2]]);
+                real(2.0 * params.thread_radius + params.skin)
+            };
+            let (base, height) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, origin);
+            let half = L::Scalar::from_f64(0.5);
+            boxes.item(0, item).copy_from_slice(&[
+                base[0] + half * (low[0] + high[0]),
+                base[1] + half * (low[1] + high[1]),
+                height + low[2],
+                height + high[2],
+            ]);
+            let range = |k: usize| {
+                let reach = reach * (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt();
+                cells(&params, k, base[k] + low[k] - reach, base[k] + high[k] + reach)
+            };
+            let ((x0, x1), (y0, y1)) = (range(0), range(1));
+            for y in y0..=y1 {
+                for x in x0..=x1 {
+                    let cell = cell_index(&params, x, y);
+                    let place = counts[cell].fetch_add(1, Ordering::Relaxed);
+                    if place < params.capacity {
+                        lists.set(cell * params.capacity as usize + place as usize, item as u32);
+                    } else {
+                        flags[status::FLAGS].fetch_or(status::CELL_FULL, Ordering::Relaxed);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Contact: nodes of threads and of yarn surfaces against the structured surfaces of other yarns, and beams against beams.
+//!
+//! `grid` sorts slabs of yarns and beams into cells, `candidates` finds for each slave which bodies are near and at which
+//! face, and every step `penalty` walks from the last face to the closest one, over a surface that is a grid of
+//! rings and slices. `threads` does the same for pairs of beams. Forces and contact stiffness are added as integers, so
+//! their sum does not depend on the order, and the forces of a pair cancel exactly.
+
+pub mod candidates;
+pub mod face;
+pub mod friction;
+pub mod grid;
+pub mod penalty;
+pub mod threads;
+
+use crate::kernel::lane::Real;
+use bytemuck::{Pod, Zeroable};
+use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
+
+/// A body with a structured surface, as the kernels see it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable, PartialEq, Eq)]
+pub struct Body {
+    /// Where the body's ring starts in the table of ring lines.
+    pub ring_start: u32,
+    /// Nodes on the ring around a section.
+    pub ring: u32,
+    /// Slices along the fibre.
+    pub slices: u32,
+    /// 1 if the last slice is followed by the first.
+    pub closed: u32,
+    /// Image of the slice behind the last, in periods along x and y.
+    pub wrap: [i32; 2],
+}
+
+/// Integers of a body in the table.
+pub const BODY: usize = 6;
+
+/// Constants that all contact stages share.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Params {
+    /// Periods along x and y in quanta; 0 for a free scene.
+    pub period: [i32; 2],
+    /// Cells of the grid along x and y.
+    pub cells: [u32; 2],
+    /// Items that a cell can hold.
+    pub capacity: u32,
+    /// Slots of a slave node, and of a beam.
+    pub slots: u32,
+    pub beam_slots: u32,
+    /// Slabs of yarns among the grid's items; beams come after them.
+    pub slabs: u32,
+    /// Low corner of the grid and size of its cells, mm.
+    pub origin: [f32; 2],
+    pub cell: [f32; 2],
+    /// Distance beyond touching at which pairs become candidates, mm.
+    pub skin: f32,
+    /// Friction coefficient.
+    pub friction: f32,
+    /// Tangential over normal penalty.
+    pub tangential: f32,
+    /// Share of critical damping.
+    pub damping: f32,
+    /// Size of a unit of force, N, and of stiffness, N/mm.
+    pub force_quantum: f32,
+    pub stiffness_quantum: f32,
+    /// Radius of threads, mm.
+    pub thread_radius: f32,
+    /// Penalty of a pair of beams, N/mm.
+    pub thread_thread: f32,
+    /// Arc length within which beams of one thread ignore each other, mm.
+    pub self_arc: f32,
+    /// Deepest penetration of a surface node that is still pushed out, mm.
+    pub depth: f32,
+}
+
+/// No candidate in a slot.
+pub const EMPTY: u32 = u32::MAX;
+
+/// Places in the status buffer.
+pub mod status {
+    /// Flags below.
+    pub const FLAGS: usize = 0;
+    /// Largest displacement since the last search, bits of an f32, mm.
+    pub const TRAVEL: usize = 1;
+    /// Largest penetration of a thread into a yarn, of yarns, of threads; bits of an f32, mm.
+    pub const PENETRATION: [usize; 3] = [2, 3, 4];
+    /// Largest speed, bits of an f32, mm/s.
+    pub const SPEED: usize = 5;
+    /// Nodes and beams that touch something.
+    pub const TOUCHING: [usize; 3] = [6, 7, 8];
+    /// Size of the buffer.
+    pub const SIZE: usize = 16;
+
+    /// A cell of the grid is full.
+    pub const CELL_FULL: u32 = 1;
+    /// The slots of a slave node or beam are full.
+    pub const SLOTS_FULL: u32 = 2;
+    /// A contact force outgrew its integer.
+    pub const FORCE_RANGE: u32 = 4;
+    /// A position left the range of its quanta, or is not a number.
+    pub const NOT_FINITE: u32 = 8;
+}
+
+/// Key of a candidate: what is touched, and in which lateral image, −8 to 7 periods along x and y.
+#[inline(always)]
+pub fn key(body: usize, image: [i32; 2]) -> u32 {
+    (body as u32) << 8 | ((image[0] + 8) as u32 & 15) << 4 | ((image[1] + 8) as u32 & 15)
+}
+
+/// Body and image of a key.
+#[inline(always)]
+pub fn of_key(key: u32) -> (usize, [i32; 2]) {
+    ((key >> 8) as usize, [(key >> 4 & 15) as i32 - 8, (key & 15) as i32 - 8])
+}
+
+/// Adds a force to one node and its opposite, by weights, to others: as integers, so that the sum is exactly zero.
+#[inline(always)]
+pub fn add_pair<R: Real, const N: usize, const M: usize>(
+    forces: &[AtomicI32],
+    flags: &AtomicU32,
+    force: [R; 3],
+    quantum: R,
+    to: [(usize, R); N],
+    from: [(usize, R); M],
+) {
+    let plane = forces.len() / 3;
+    let limit = R::from_i32(1 << 27);
+    for (k, force) in force.into_iter().enumerate() {
+        let quanta = force / quantum;
+        if !(quanta.abs() < limit) {
+            flags.fetch_or(status::FORCE_RANGE, Ordering::Relaxed);
+            return;
+        }
+        let mut rest = quanta.to_i32();
+        let mut back = rest;
+        for (i, (node, weight)) in to.into_iter().enumerate() {
+            let part = if i + 1 == N { rest } else { (quanta * weight).to_i32() };
+            rest -= part;
+            forces[node + k * plane].fetch_add(part, Ordering::Relaxed);
+        }
+        for (i, (node, weight)) in from.into_iter().enumerate() {
+            let part = if i + 1 == M { back } else { (quanta * weight).to_i32() };
+            back -= part;
+            forces[node + k * plane].fetch_sub(part, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Adds stiffness to nodes by weights.
+#[inline(always)]
+pub fn add_stiffness<R: Real>(
+    to: &[AtomicI32],
+    stiffness: R,
+    quantum: R,
+    nodes: impl IntoIterator<Item = (usize, R)>,
+) {
+    let quanta = stiffness / quantum;
+    for (node, weight) in nodes {
+        to[node].fetch_add((quanta * weight.abs()).to_i32(), Ordering::Relaxed);
+    }
+}

@@ -1,0 +1,160 @@
+//! Penalty contact of slave nodes with the surfaces of yarns, every step, for the candidates of each slave.
+
+use super::face::{Place, Surface};
+use super::friction::slide;
+use super::{BODY, EMPTY, Params, add_pair, add_stiffness, of_key, status};
+use crate::kernel::lane::{Lane, Real};
+use crate::kernel::node::{Displacements, Field, Lattice};
+use crate::kernel::stage::{Io, Kernel, raise};
+use crate::kernel::vector::{apply, dot, fma, scale, sub};
+use std::ops::Range;
+use std::sync::atomic::Ordering;
+
+/// Integers of a slave: node, own body (or [`EMPTY`] for a thread).
+pub const SLAVE: usize = 2;
+/// Numbers of a slave: penalty, N/mm; radius, mm.
+pub const SLAVE_VALUES: usize = 2;
+/// Integers of a slot: key, ring position, slice.
+pub const SLOT_KEYS: usize = 3;
+/// Numbers of a slot: elastic tangential displacement, mm (3); normal force, N.
+pub const SLOT_STATE: usize = 4;
+/// Sums of a slave over steps: work lost to friction, to contact damping, work of the growing radius, mJ; slip, mm; then
+/// force ⊗ ΔX, N·mm (9). Fourteenth: elastic energy now, mJ.
+pub const SUMS: usize = 14;
+pub const SUM_FRICTION: usize = 0;
+pub const SUM_DAMPING: usize = 1;
+pub const SUM_RADIUS: usize = 2;
+pub const SUM_SLIP: usize = 3;
+pub const SUM_VIRIAL: usize = 4;
+pub const SUM_ENERGY: usize = 13;
+
+pub const SLAVES: usize = 0;
+pub const VALUES: usize = 1;
+pub const BODIES: usize = 2;
+pub const RING_LINES: usize = 3;
+pub const REFERENCE: usize = 4;
+pub const QUANTA: usize = 5;
+pub const REMAINDER: usize = 6;
+pub const VELOCITY: usize = 7;
+pub const MASS: usize = 8;
+const KEYS: usize = 9;
+const STATE: usize = 10;
+const SUM: usize = 11;
+const FORCE: usize = 12;
+const STIFFNESS: usize = 13;
+const STATUS: usize = 14;
+
+/// Contact forces of slave nodes.
+pub struct Penalty;
+
+impl Kernel for Penalty {
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let params: Params = io.params();
+        let slots = params.slots as usize;
+        let real = |x: f32| L::Scalar::from_f64(f64::from(x));
+        let constant = L::Scalar::from_f64;
+        let zero = constant(0.0);
+        let surface = Surface {
+            bodies: bytemuck::cast_slice(&io.uints(BODIES)[..]),
+            ring_lines: io.uints(RING_LINES),
+            reference: Lattice::new(io, REFERENCE),
+            displacement: Displacements::new(io, QUANTA, REMAINDER),
+            gradient: &io.row.gradient,
+            period: params.period,
+        };
+        debug_assert!(io.uints(BODIES).len() % BODY == 0);
+        let velocity = Field::new(io, VELOCITY);
+        let (slaves, values, mass) = (io.uints(SLAVES), io.scalars(VALUES), io.scalars(MASS));
+        let mut keys = io.own::<u32>(KEYS);
+        let mut states = io.own::<L::Scalar>(STATE);
+        let mut sums = io.own::<L::Scalar>(SUM);
+        let (forces, stiffness, flags) = (io.atomics(FORCE), io.atomics(STIFFNESS), io.atomic_uints(STATUS));
+        let elapsed = io.row.dt_mid + io.row.dt_mid - io.row.dt;
+        let per_step = constant(2.0) / io.row.dt;
+        for item in items {
+            let slot_keys = keys.item(0, item);
+            if slot_keys[0] == EMPTY {
+                continue;
+            }
+            let slave = slaves[SLAVE * item] as usize;
+            let is_thread = slaves[SLAVE * item + 1] == EMPTY;
+            let (penalty, full_radius) = (values[SLAVE_VALUES * item], values[SLAVE_VALUES * item + 1]);
+            let radius = full_radius * io.row.radius;
+            let slot_states = states.item(0, item);
+            let sum = sums.item(0, item);
+            let mut energy = zero;
+            let mut touches = false;
+            for slot in 0..slots {
+                let at = &mut slot_keys[SLOT_KEYS * slot..][..SLOT_KEYS];
+                if at[0] == EMPTY {
+                    break;
+                }
+                let (body, image) = of_key(at[0]);
+                let from = Place { ring: at[1] as i32, slice: at[2] as i32 };
+                let (place, corners, point) = surface.walk(slave, body, image, from);
+                (at[1], at[2]) = (place.ring as u32, place.slice as u32);
+                let state = &mut slot_states[SLOT_STATE * slot..][..SLOT_STATE];
+                let elastic = [state[0], state[1], state[2]];
+                let tangential = penalty * real(params.tangential);
+                let touch = point.normal_and_distance().filter(|(_, distance)| {
+                    let gap = *distance - radius;
+                    gap < zero && -*distance < real(params.depth)
+                });
+                let Some((normal, distance)) = touch else {
+                    sum[SUM_FRICTION] =
+                        sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
+                    state.fill(zero);
+                    continue;
+                };
+                touches = true;
+                let depth = radius - distance;
+                let weights = point.weights();
+                let mut motion = velocity.at(slave);
+                let mut apart = [zero; 3];
+                for a in 0..4 {
+                    motion = fma(velocity.at(corners.nodes[a]), -weights[a], motion);
+                    apart = fma(corners.reference[a], -weights[a], apart);
+                }
+                let rate = apply(&io.row.rate, apart);
+                let motion = [motion[0] + rate[0], motion[1] + rate[1], motion[2] + rate[2]];
+                let approach = dot(motion, normal);
+                let mut inverse = constant(1.0) / mass[slave];
+                for a in 0..4 {
+                    inverse = inverse + weights[a] * weights[a] / mass[corners.nodes[a]];
+                }
+                let viscosity = real(params.damping) * constant(2.0) * (penalty / inverse).sqrt();
+                let elastic_force = penalty * depth;
+                let normal_force = (elastic_force - viscosity * approach).max(zero);
+                sum[SUM_DAMPING] = sum[SUM_DAMPING] + (elastic_force - normal_force) * approach * elapsed;
+                sum[SUM_RADIUS] = sum[SUM_RADIUS] + elastic_force * full_radius * io.row.radius_increment;
+                let limit = real(params.friction) * normal_force;
+                let slid = slide(elastic, scale(motion, elapsed), normal, tangential, limit);
+                sum[SUM_FRICTION] = sum[SUM_FRICTION] + slid.dissipated;
+                sum[SUM_SLIP] = sum[SUM_SLIP] + slid.slip;
+                state[..3].copy_from_slice(&slid.elastic);
+                state[3] = normal_force;
+                energy = energy
+                    + constant(0.5) * (elastic_force * depth + tangential * dot(slid.elastic, slid.elastic));
+                let force = sub(scale(normal, normal_force), scale(slid.elastic, tangential));
+                for i in 0..3 {
+                    for j in 0..3 {
+                        let v = &mut sum[SUM_VIRIAL + 3 * i + j];
+                        *v = *v - force[i] * apart[j];
+                    }
+                }
+                let masters = [0, 1, 2, 3].map(|a| (corners.nodes[a], weights[a]));
+                let one = (slave, constant(1.0));
+                add_pair(forces, &flags[status::FLAGS], force, real(params.force_quantum), [one], masters);
+                let row_sum = constant(2.0) * (penalty + viscosity * per_step);
+                let nodes = masters.into_iter().chain([one]);
+                add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes);
+                raise(&flags[status::PENETRATION[usize::from(!is_thread)]], depth);
+            }
+            sum[SUM_ENERGY] = energy;
+            if touches {
+                flags[status::TOUCHING[usize::from(!is_thread)]].fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    }
+}

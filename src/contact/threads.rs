@@ -1,0 +1,288 @@
+//! Contact of beams with beams: closest points of two segments, penalty and friction as for faces.
+//!
+//! Where the closest point is an end that two beams of a thread share, each counts half.
+
+use super::friction::slide;
+use super::grid::{BOX, absolute, cell_index, cells, inverse, pull_back};
+use super::penalty::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, SUM_VIRIAL};
+use super::{EMPTY, Params, add_pair, add_stiffness, key, of_key, status};
+use crate::elements::beam2;
+use crate::kernel::lane::{Lane, Real};
+use crate::kernel::node::{Displacements, Field, Lattice};
+use crate::kernel::position::QUANTUM;
+use crate::kernel::stage::{Io, Kernel, raise};
+use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale, sub};
+use std::ops::Range;
+use std::sync::atomic::Ordering;
+
+/// Numbers of a beam's place on its thread: arc length of its middle, mm; its length, mm; length of a closed thread, mm, else 0.
+pub const ARC: usize = 3;
+/// Numbers of a slot: elastic tangential displacement, mm (3); normal force, N.
+pub const STATE: usize = 4;
+
+/// Thread of each beam.
+pub const THREADS: usize = 0;
+pub const ARCS: usize = 1;
+pub const ENDS: usize = 2;
+pub const BEAMS: usize = 3;
+pub const REFERENCE: usize = 4;
+pub const QUANTA: usize = 5;
+pub const REMAINDER: usize = 6;
+
+/// Finds pairs of beams.
+pub struct Pairs;
+/// Contact forces of pairs of beams.
+pub struct Force;
+
+/// What both kernels read of beams.
+struct Scene<'a, R> {
+    ends: &'a [u32],
+    beams: &'a [R],
+    reference: Lattice<'a>,
+    displacement: Displacements<'a, R>,
+    gradient: &'a [[R; 3]; 3],
+    period: [i32; 2],
+}
+
+impl<'a, R: Real> Scene<'a, R> {
+    #[inline(always)]
+    fn new(io: &'a Io<R>, period: [i32; 2]) -> Self {
+        Self {
+            ends: io.uints(ENDS),
+            beams: io.scalars(BEAMS),
+            reference: Lattice::new(io, REFERENCE),
+            displacement: Displacements::new(io, QUANTA, REMAINDER),
+            gradient: &io.row.gradient,
+            period,
+        }
+    }
+
+    /// A beam's vector, in the reference and now.
+    #[inline(always)]
+    fn vector(&self, beam: usize) -> (Vector<R>, Vector<R>) {
+        let (d, change) = beam2::vector(self.beams, self.ends, beam, &self.displacement, self.gradient);
+        (d, add(d, change))
+    }
+
+    /// From the first node of `a` to the first node of `b` in an image, in the reference and now.
+    #[inline(always)]
+    fn between(&self, a: usize, b: usize, image: [i32; 2]) -> (Vector<R>, Vector<R>) {
+        let (a, b) = (self.ends[2 * a] as usize, self.ends[2 * b] as usize);
+        let shift = [image[0].wrapping_mul(self.period[0]), image[1].wrapping_mul(self.period[1])];
+        let rest: Vector<R> = self.reference.between(b, a, shift);
+        (rest, add(add(rest, apply(self.gradient, rest)), self.displacement.between(b, a)))
+    }
+}
+
+/// Coordinates (0 to 1) of the closest points of segment `0 → d1` and segment `start → start + d2`.
+#[inline(always)]
+pub fn closest_points<R: Real>(d1: Vector<R>, d2: Vector<R>, start: Vector<R>) -> (R, R) {
+    let (zero, one) = (R::from_f64(0.0), R::from_f64(1.0));
+    let unit = |x: R| x.max(zero).min(one);
+    let (a, e, b) = (dot(d1, d1), dot(d2, d2), dot(d1, d2));
+    let (c, f) = (-dot(d1, start), -dot(d2, start));
+    let determinant = a * e - b * b;
+    let s = if determinant > a * e * R::from_f64(1e-6) {
+        unit((b * f - c * e) / determinant)
+    } else {
+        // parallel: the middle of the overlap
+        let (p, q) = (dot(d1, start) / a, dot(d1, add(start, d2)) / a);
+        let (low, high) = (p.min(q).max(zero), p.max(q).min(one));
+        unit(R::from_f64(0.5) * (low + high))
+    };
+    let t = (b * s + f) / e;
+    if t < zero {
+        (unit(-c / a), zero)
+    } else if t > one {
+        (unit((b - c) / a), one)
+    } else {
+        (s, t)
+    }
+}
+
+impl Kernel for Pairs {
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        const COUNTS: usize = 7;
+        const ITEMS: usize = 8;
+        const BOXES: usize = 9;
+        let params: Params = io.params();
+        let constant = L::Scalar::from_f64;
+        let scene = Scene::new(io, params.period);
+        let (threads, arcs) = (io.uints(THREADS), io.scalars(ARCS));
+        let (counts, lists, boxes) = (io.uints(COUNTS), io.uints(ITEMS), io.scalars(BOXES));
+        let mut keys = io.own::<u32>(10);
+        let mut states = io.own::<L::Scalar>(11);
+        let flags = io.atomic_uints(12);
+        let inverse = inverse(&io.row.gradient);
+        let period = params.period.map(|p| L::Scalar::from_i32(p) * constant(QUANTUM));
+        let reach = constant(f64::from(2.0 * params.thread_radius + params.skin));
+        let slots = params.beam_slots as usize;
+        let mut found = Vec::with_capacity(4 * slots);
+        for beam in items {
+            found.clear();
+            let middle = &boxes[BOX * (params.slabs as usize + beam)..][..BOX];
+            let (_, along) = scene.vector(beam);
+            let (start, _) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, scene.ends[2 * beam] as usize);
+            let back = pull_back(&inverse, along);
+            let range = |k: usize| {
+                let end = start[k] + back[k];
+                cells(&params, k, start[k].min(end), start[k].max(end))
+            };
+            let ((x0, x1), (y0, y1)) = (range(0), range(1));
+            if !(start[0].is_finite() && start[1].is_finite()) {
+                flags[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
+            }
+            for y in y0..=y1 {
+                for x in x0..=x1 {
+                    let cell = cell_index(&params, x, y);
+                    let listed = counts[cell].min(params.capacity) as usize;
+                    for &near in &lists[cell * params.capacity as usize..][..listed] {
+                        if near < params.slabs + beam as u32 + 1 {
+                            continue;
+                        }
+                        let other = (near - params.slabs) as usize;
+                        if threads[other] == threads[beam] {
+                            let (a, b) = (&arcs[ARC * beam..][..ARC], &arcs[ARC * other..][..ARC]);
+                            let direct = (a[0] - b[0]).abs();
+                            let around = if a[2] > constant(0.0) { direct.min(a[2] - direct) } else { direct };
+                            let between = around - constant(0.5) * (a[1] + b[1]);
+                            if between < constant(f64::from(params.self_arc)) {
+                                continue;
+                            }
+                        }
+                        let theirs = &boxes[BOX * near as usize..][..BOX];
+                        let image = [0, 1].map(|k| {
+                            if params.period[k] == 0 { 0 } else { ((middle[k] - theirs[k]) / period[k]).to_i32() }
+                        });
+                        let (_, apart) = scene.between(beam, other, image);
+                        let (_, direction) = scene.vector(other);
+                        let (s, t) = closest_points(along, direction, apart);
+                        let offset = sub(scale(along, s), fma(direction, t, apart));
+                        let key = key(other, image);
+                        if norm(offset) < reach && !found.contains(&key) {
+                            found.push(key);
+                        }
+                    }
+                }
+            }
+            found.sort_unstable();
+            if found.len() > slots {
+                flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
+                found.truncate(slots);
+            }
+            let (keys, states) = (keys.item(0, beam), states.item(0, beam));
+            let old: Vec<(u32, [L::Scalar; STATE])> = keys
+                .iter()
+                .zip(states.chunks_exact(STATE))
+                .filter(|(key, _)| **key != EMPTY)
+                .map(|(key, s)| (*key, [s[0], s[1], s[2], s[3]]))
+                .collect();
+            for (slot, (key, state)) in keys.iter_mut().zip(states.chunks_exact_mut(STATE)).enumerate() {
+                *key = found.get(slot).copied().unwrap_or(EMPTY);
+                let known = old.iter().find(|(old, _)| *key != EMPTY && old == key);
+                state.copy_from_slice(&known.map_or([constant(0.0); STATE], |(_, state)| *state));
+            }
+        }
+    }
+}
+
+impl Kernel for Force {
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        const VELOCITY: usize = 7;
+        const MASS: usize = 8;
+        let params: Params = io.params();
+        let real = |x: f32| L::Scalar::from_f64(f64::from(x));
+        let constant = L::Scalar::from_f64;
+        let (zero, one) = (constant(0.0), constant(1.0));
+        let scene = Scene::new(io, params.period);
+        let velocity = Field::new(io, VELOCITY);
+        let mass = io.scalars(MASS);
+        let mut keys = io.own::<u32>(9);
+        let mut states = io.own::<L::Scalar>(10);
+        let mut sums = io.own::<L::Scalar>(11);
+        let (forces, stiffness, flags) = (io.atomics(12), io.atomics(13), io.atomic_uints(14));
+        let radius = real(params.thread_radius) * io.row.radius;
+        let elapsed = io.row.dt_mid + io.row.dt_mid - io.row.dt;
+        let per_step = constant(2.0) / io.row.dt;
+        for beam in items {
+            let slot_keys = keys.item(0, beam);
+            if slot_keys[0] == EMPTY {
+                continue;
+            }
+            let slot_states = states.item(0, beam);
+            let sum = sums.item(0, beam);
+            let mut energy = zero;
+            let mut touches = false;
+            let (rest, along) = scene.vector(beam);
+            let own = [scene.ends[2 * beam] as usize, scene.ends[2 * beam + 1] as usize];
+            for (slot, key) in slot_keys.iter().enumerate().take_while(|(_, key)| **key != EMPTY) {
+                let (other, image) = of_key(*key);
+                let (apart_rest, apart) = scene.between(beam, other, image);
+                let (direction_rest, direction) = scene.vector(other);
+                let (s, t) = closest_points(along, direction, apart);
+                let offset = sub(scale(along, s), fma(direction, t, apart));
+                let distance = norm(offset);
+                let depth = radius + radius - distance;
+                let share = |x: L::Scalar| if x <= zero || x >= one { constant(0.5) } else { one };
+                let penalty = real(params.thread_thread) * share(s) * share(t);
+                let tangential = penalty * real(params.tangential);
+                let state = &mut slot_states[STATE * slot..][..STATE];
+                let elastic = [state[0], state[1], state[2]];
+                if depth <= zero || distance < constant(1e-6) {
+                    sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
+                    state.fill(zero);
+                    continue;
+                }
+                touches = true;
+                let normal = scale(offset, one / distance);
+                let theirs = [scene.ends[2 * other] as usize, scene.ends[2 * other + 1] as usize];
+                let nodes = [(own[0], one - s), (own[1], s)];
+                let others = [(theirs[0], one - t), (theirs[1], t)];
+                let mut motion = [zero; 3];
+                let mut inverse = zero;
+                for (node, weight) in nodes {
+                    motion = fma(velocity.at(node), weight, motion);
+                    inverse = inverse + weight * weight / mass[node];
+                }
+                for (node, weight) in others {
+                    motion = fma(velocity.at(node), -weight, motion);
+                    inverse = inverse + weight * weight / mass[node];
+                }
+                let between = sub(scale(rest, s), fma(direction_rest, t, apart_rest));
+                let motion = add(motion, apply(&io.row.rate, between));
+                let approach = dot(motion, normal);
+                let viscosity = real(params.damping) * constant(2.0) * (penalty / inverse).sqrt();
+                let elastic_force = penalty * depth;
+                let normal_force = (elastic_force - viscosity * approach).max(zero);
+                sum[SUM_DAMPING] = sum[SUM_DAMPING] + (elastic_force - normal_force) * approach * elapsed;
+                let growth = constant(2.0) * real(params.thread_radius) * io.row.radius_increment;
+                sum[SUM_RADIUS] = sum[SUM_RADIUS] + elastic_force * growth;
+                let limit = real(params.friction) * normal_force;
+                let slid = slide(elastic, scale(motion, elapsed), normal, tangential, limit);
+                sum[SUM_FRICTION] = sum[SUM_FRICTION] + slid.dissipated;
+                sum[SUM_SLIP] = sum[SUM_SLIP] + slid.slip;
+                state[..3].copy_from_slice(&slid.elastic);
+                state[3] = normal_force;
+                energy = energy
+                    + constant(0.5) * (elastic_force * depth + tangential * dot(slid.elastic, slid.elastic));
+                let force = sub(scale(normal, normal_force), scale(slid.elastic, tangential));
+                for i in 0..3 {
+                    for j in 0..3 {
+                        let v = &mut sum[SUM_VIRIAL + 3 * i + j];
+                        *v = *v - force[i] * between[j];
+                    }
+                }
+                add_pair(forces, &flags[status::FLAGS], force, real(params.force_quantum), nodes, others);
+                let row_sum = constant(2.0) * (penalty + viscosity * per_step);
+                add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes.into_iter().chain(others));
+                raise(&flags[status::PENETRATION[2]], depth);
+            }
+            sum[SUM_ENERGY] = energy;
+            if touches {
+                flags[status::TOUCHING[2]].fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Accelerations: each node gathers its corner slots in a fixed order, adds contact, and divides by its mass.
+//!
+//! With contact-aware mass, a node is as heavy as a stable step needs, m ≥ dt²/4 · K, with K the row sum of the contact
+//! stiffness at the node; what was added fades once contact is lost.
+
+use crate::elements::hex8::LANES;
+use crate::kernel::lane::{Lane, Real};
+use crate::kernel::stage::{Io, Kernel};
+use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
+
+/// Corner slots a solid node gathers.
+pub const SOLID: usize = 8;
+/// Slots a thread node gathers: two beams, then three bends (as first, middle and last node).
+pub const THREAD: usize = 5;
+/// Nothing to gather.
+pub const NONE: u32 = u32::MAX;
+
+/// Constants of the stage.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Params {
+    /// First node of a thread.
+    pub first_thread: u32,
+    /// Size of a unit of contact force, N.
+    pub force_quantum: f32,
+    /// Size of a unit of contact stiffness, N/mm.
+    pub stiffness_quantum: f32,
+    /// Factor on the mass that contact calls for.
+    pub mass_factor: f32,
+    /// Share of added mass kept per step.
+    pub mass_memory: f32,
+}
+
+pub const SOLID_SLOTS: usize = 0;
+pub const HEX_FORCE: usize = 1;
+pub const THREAD_SLOTS: usize = 2;
+pub const BEAM_FORCE: usize = 3;
+pub const BEND_FORCE: usize = 4;
+pub const MASS: usize = 5;
+/// Acceleration, mm/s² (3 planes).
+const ACCELERATION: usize = 6;
+/// Inverse of the mass that acts, 1/tonne.
+const INVERSE_MASS: usize = 7;
+/// Contact force in quanta (3 planes), set back to zero.
+const CONTACT_FORCE: usize = 8;
+/// Contact stiffness in quanta, set back to zero.
+const CONTACT_STIFFNESS: usize = 9;
+/// Added mass, tonne.
+const ADDED_MASS: usize = 10;
+
+/// Assembly; with `CONTACT` contact forces, with `MASS_ADDED` contact-aware mass.
+pub struct Assemble<const CONTACT: bool, const MASS_ADDED: bool>;
+
+impl<const CONTACT: bool, const MASS_ADDED: bool> Kernel for Assemble<CONTACT, MASS_ADDED> {
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let params: Params = io.params();
+        let first_thread = params.first_thread as usize;
+        let (solid, hexes) = (io.uints(SOLID_SLOTS), io.scalars(HEX_FORCE));
+        let (thread, beams, bends) = (io.uints(THREAD_SLOTS), io.scalars(BEAM_FORCE), io.scalars(BEND_FORCE));
+        let masses = io.scalars(MASS);
+        let mut acceleration = io.own::<L::Scalar>(ACCELERATION);
+        let mut inverse = io.own::<L::Scalar>(INVERSE_MASS);
+        let mut contact_force = CONTACT.then(|| io.own::<i32>(CONTACT_FORCE));
+        let mut contact_stiffness = MASS_ADDED.then(|| io.own::<i32>(CONTACT_STIFFNESS));
+        let mut added = MASS_ADDED.then(|| io.own::<L::Scalar>(ADDED_MASS));
+        let zero = L::Scalar::from_f64(0.0);
+        let real = |x: f32| L::Scalar::from_f64(f64::from(x));
+        let reach = real(params.mass_factor * 0.25) * io.row.dt * io.row.dt * real(params.stiffness_quantum);
+        for node in items {
+            let mut force = [zero; 3];
+            if node < first_thread {
+                for &slot in &solid[SOLID * node..][..SOLID] {
+                    if slot == NONE {
+                        break;
+                    }
+                    let slot = &hexes[slot as usize..][..2 * LANES + 1];
+                    force = [force[0] + slot[0], force[1] + slot[LANES], force[2] + slot[2 * LANES]];
+                }
+            } else {
+                let slots = &thread[THREAD * (node - first_thread)..][..THREAD];
+                // the node is the first of one beam and the second of another
+                for (slot, sign) in slots[..2].iter().zip([1.0, -1.0]) {
+                    if *slot != NONE {
+                        add(&mut force, &beams[3 * *slot as usize..][..3], sign);
+                    }
+                }
+                for (slot, signs) in slots[2..].iter().zip([[1.0, 0.0], [-1.0, 1.0], [0.0, -1.0]]) {
+                    if *slot != NONE {
+                        for (k, sign) in signs.into_iter().enumerate().filter(|(_, s)| *s != 0.0) {
+                            add(&mut force, &bends[6 * *slot as usize + 3 * k..][..3], sign);
+                        }
+                    }
+                }
+            }
+            if let Some(contact) = &mut contact_force {
+                for (k, force) in force.iter_mut().enumerate() {
+                    let quanta = contact.at(k, node);
+                    if *quanta != 0 {
+                        *force = *force + L::Scalar::from_i32(*quanta) * real(params.force_quantum);
+                        *quanta = 0;
+                    }
+                }
+            }
+            let mut mass = masses[node];
+            if let (Some(stiffness), Some(added)) = (&mut contact_stiffness, &mut added) {
+                let quanta = stiffness.at(0, node);
+                let needed = (L::Scalar::from_i32(*quanta) * reach - mass).max(zero);
+                *quanta = 0;
+                let added = added.at(0, node);
+                *added = needed.max(*added * real(params.mass_memory));
+                mass = mass + *added;
+            }
+            let inverse_mass = L::Scalar::from_f64(1.0) / mass;
+            *inverse.at(0, node) = inverse_mass;
+            for (k, force) in force.into_iter().enumerate() {
+                *acceleration.at(k, node) = force * inverse_mass;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add<R: Real>(to: &mut [R; 3], force: &[R], sign: f64) {
+    for (to, force) in to.iter_mut().zip(force) {
+        *to = *to + *force * R::from_f64(sign);
+    }
+}

@@ -1,0 +1,84 @@
+//! Bending between two consecutive beams, without rotational unknowns: E = (2 EI/l̄)(T − T₀)², T = tan(θ/2) of the turning
+//! angle θ, l̄ the mean length of the two beams. T = |t₁ × t₂|/(1 + t₁·t₂) is smoothed to √(T² + T_ε²), since its gradient has no
+//! direction for a straight thread with a curved rest state. Only the size of the rest curvature is kept, not its plane: a
+//! thread has no torsional stiffness here.
+
+use super::beam2::{TABLE, add_virial, vector};
+use crate::kernel::lane::{Lane, Real};
+use crate::kernel::node::Displacements;
+use crate::kernel::stage::{Io, Kernel};
+use crate::kernel::vector::{add, cross, dot, norm, scale, sub};
+use std::ops::Range;
+
+/// Numbers of a bend in the table: 2 EI/l̄ in N·mm, smoothed rest value of T.
+pub const BEND: usize = 2;
+/// Smoothing T_ε of tan(θ/2): 0.6 degrees of turning.
+pub const SMOOTHING: f64 = 0.005;
+
+/// Beams `[2]` of each bend.
+pub const PAIRS: usize = 0;
+pub const BENDS: usize = 1;
+pub const ENDS: usize = 2;
+pub const BEAMS: usize = 3;
+pub const QUANTA: usize = 4;
+pub const REMAINDER: usize = 5;
+/// Force along each of the two beams, on its first node, N (2 × 3); its second node gets the opposite.
+const FORCE: usize = 6;
+/// Energy, mJ.
+const ENERGY: usize = 7;
+/// Sum of force ⊗ D over steps, N·mm (9), for periodic scenes.
+const VIRIAL: usize = 8;
+
+/// Bending forces; with `PERIODIC`, also their part of the homogenised stress.
+pub struct Bend<const PERIODIC: bool>;
+
+/// √(T² + T_ε²).
+pub fn smoothed(t: f64) -> f64 {
+    libm::sqrt(t * t + SMOOTHING * SMOOTHING)
+}
+
+impl<const PERIODIC: bool> Kernel for Bend<PERIODIC> {
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let w = Displacements::new(io, QUANTA, REMAINDER);
+        let (pairs, bends, ends, table) = (io.uints(PAIRS), io.scalars(BENDS), io.uints(ENDS), io.scalars(BEAMS));
+        let mut forces = io.own::<L::Scalar>(FORCE);
+        let mut energies = io.own::<L::Scalar>(ENERGY);
+        let mut virials = PERIODIC.then(|| io.own::<L::Scalar>(VIRIAL));
+        let constant = L::Scalar::from_f64;
+        debug_assert!(table.len() % TABLE == 0);
+        for bend in items {
+            let beams = [pairs[2 * bend] as usize, pairs[2 * bend + 1] as usize];
+            let (stiffness, rest) = (bends[BEND * bend], bends[BEND * bend + 1]);
+            let mut reference = [[constant(0.0); 3]; 2];
+            let mut tangent = [[constant(0.0); 3]; 2];
+            let mut inverse = [constant(0.0); 2];
+            for k in 0..2 {
+                let (d, change) = vector(table, ends, beams[k], &w, &io.row.gradient);
+                let current = add(d, change);
+                reference[k] = d;
+                inverse[k] = constant(1.0) / norm(current);
+                tangent[k] = scale(current, inverse[k]);
+            }
+            let cosine = dot(tangent[0], tangent[1]);
+            // a thread folded onto itself: tan(θ/2) ends at 10
+            let opening = (constant(1.0) + cosine).max(constant(0.02));
+            let turned = cross(tangent[0], tangent[1]);
+            let t = (dot(turned, turned) / (opening * opening) + constant(SMOOTHING * SMOOTHING)).sqrt();
+            let slope = constant(-2.0) * stiffness * (constant(1.0) - rest / t) / (opening * opening);
+            let g = [
+                scale(sub(tangent[1], scale(tangent[0], cosine)), slope * inverse[0]),
+                scale(sub(tangent[0], scale(tangent[1], cosine)), slope * inverse[1]),
+            ];
+            let out = forces.item(0, bend);
+            out[..3].copy_from_slice(&g[0]);
+            out[3..].copy_from_slice(&g[1]);
+            *energies.at(0, bend) = stiffness * (t - rest) * (t - rest);
+            if let Some(virials) = &mut virials {
+                for k in 0..2 {
+                    add_virial(virials.item(0, bend), g[k], reference[k]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! Buffers: plain arrays of scalars or integers, aligned to cache lines, the same bytes on every backend.
+
+use super::lane::Real;
+use bytemuck::{Pod, Zeroable};
+
+/// What a buffer holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Scalars of the run's precision.
+    Scalar,
+    /// Signed integers.
+    Int,
+    /// Unsigned integers.
+    Uint,
+}
+
+/// Name of a buffer in a plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Buffer(pub usize);
+
+/// A buffer as the plan describes it.
+#[derive(Debug, Clone)]
+pub struct Description {
+    pub name: &'static str,
+    pub kind: Kind,
+    /// Numbers, not bytes.
+    pub len: usize,
+    /// Part of the state: hashed and written to checkpoints.
+    pub persistent: bool,
+    /// What the buffer holds at the start; the rest is zero.
+    pub initial: Initial,
+}
+
+/// Contents at the start.
+#[derive(Debug, Clone)]
+pub enum Initial {
+    Zero,
+    Scalar(Vec<f64>),
+    Int(Vec<i32>),
+    Uint(Vec<u32>),
+}
+
+#[derive(Clone, Copy, Zeroable, Pod)]
+#[repr(C, align(64))]
+struct CacheLine([u8; 64]);
+
+/// An array of one kind in host memory, aligned to cache lines.
+#[derive(Clone)]
+pub struct Array {
+    lines: Vec<CacheLine>,
+    len: usize,
+    size: usize,
+}
+
+impl Array {
+    /// Zeros, `len` numbers of `size` bytes.
+    pub fn zeros(len: usize, size: usize) -> Self {
+        let lines = vec![CacheLine::zeroed(); (len * size).div_ceil(64)];
+        Self { lines, len, size }
+    }
+
+    /// The described buffer in precision `R`.
+    pub fn new<R: Real>(description: &Description) -> Self {
+        let size = if description.kind == Kind::Scalar { size_of::<R>() } else { 4 };
+        let mut array = Self::zeros(description.len, size);
+        match &description.initial {
+            Initial::Zero => {}
+            Initial::Scalar(values) => {
+                for (to, from) in array.slice_mut::<R>().iter_mut().zip(values) {
+                    *to = R::from_f64(*from);
+                }
+            }
+            Initial::Int(values) => array.slice_mut::<i32>()[..values.len()].copy_from_slice(values),
+            Initial::Uint(values) => array.slice_mut::<u32>()[..values.len()].copy_from_slice(values),
+        }
+        array
+    }
+
+    pub fn slice<T: Pod>(&self) -> &[T] {
+        assert_eq!(size_of::<T>(), self.size);
+        &bytemuck::cast_slice(&self.lines)[..self.len]
+    }
+
+    pub fn slice_mut<T: Pod>(&mut self) -> &mut [T] {
+        assert_eq!(size_of::<T>(), self.size);
+        &mut bytemuck::cast_slice_mut(&mut self.lines)[..self.len]
+    }
+
+    /// The bytes of all numbers.
+    pub fn bytes(&self) -> &[u8] {
+        &bytemuck::cast_slice(&self.lines)[..self.len * self.size]
+    }
+
+    /// Address of the first number; the numbers stay where they are as long as the array lives.
+    pub fn address(&mut self) -> *mut u8 {
+        self.lines.as_mut_ptr().cast()
+    }
+
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+}

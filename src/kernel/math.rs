@@ -1,0 +1,114 @@
+//! Elementary functions as polynomials: the same statements, hence the same bits, on every processor, and a WGSL twin,
+//! since WGSL has neither log1p nor promises on ln and exp.
+
+use super::lane::{Lane, Real};
+
+const LN2_HIGH: f64 = 0.693_145_751_953_125; // 15 bits: exact products with exponents
+const LN2_LOW: f64 = 1.428_606_820_309_417_2e-6;
+
+/// Natural logarithm of a positive normal number; relative error of a few ulp, also next to 1.
+#[inline(always)]
+pub fn ln<L: Lane>(x: L) -> L {
+    let (m, e) = x.mantissa_exponent();
+    let f = m - L::new(1.0);
+    let s = f / (f + L::new(2.0));
+    let z = s * s;
+    let terms = L::Scalar::LN_TERMS;
+    let mut p = L::new(1.0 / (2 * terms + 1) as f64);
+    for k in (0..terms).rev() {
+        p = p.fma(z, L::new(1.0 / (2 * k + 1) as f64));
+    }
+    // 2 atanh(s) = 2 s p, with the exponent in two parts
+    e.fma(L::new(LN2_HIGH), (s + s).fma(p, e * L::new(LN2_LOW)))
+}
+
+/// ln(1 + x) for x > −1, accurate for small x.
+#[inline(always)]
+pub fn log1p<L: Lane>(x: L) -> L {
+    let u = L::new(1.0) + x;
+    ln(u) + (x - (u - L::new(1.0))) / u
+}
+
+/// e^x for |x| below 80.
+#[inline(always)]
+pub fn exp<L: Lane>(x: L) -> L {
+    let n = (x * L::new(std::f64::consts::LOG2_E)).round();
+    let r = n.fma(L::new(-LN2_LOW), n.fma(L::new(-LN2_HIGH), x));
+    let terms = L::Scalar::EXP_TERMS;
+    let mut p = L::new(1.0 / factorial(terms));
+    for k in (0..terms).rev() {
+        p = p.fma(r, L::new(1.0 / factorial(k)));
+    }
+    p * n.exp2_whole()
+}
+
+const fn factorial(n: usize) -> f64 {
+    let mut f = 1.0;
+    let mut k = 2;
+    while k <= n {
+        f *= k as f64;
+        k += 1;
+    }
+    f
+}
+
+/// asinh(√u)/√u for u ≥ 0, without the singular derivative of either factor at zero.
+#[inline(always)]
+pub fn asinh_ratio<L: Lane>(u: L) -> L {
+    // series Σ (−1)ⁿ (2n)!/(4ⁿ n!² (2n + 1)) uⁿ
+    let mut coefficients = [0.0; 10];
+    let mut c = 1.0;
+    for (n, coefficient) in coefficients.iter_mut().enumerate() {
+        *coefficient = c / (2 * n + 1) as f64;
+        c *= -((2 * n + 1) as f64) / (2 * n + 2) as f64;
+    }
+    let terms = L::Scalar::ASINH_TERMS;
+    let mut series = L::new(coefficients[terms]);
+    for k in (0..terms).rev() {
+        series = series.fma(u, L::new(coefficients[k]));
+    }
+    let one = L::new(1.0);
+    let s = u.max(L::new(1e-30)).sqrt();
+    let q = (one + u).sqrt();
+    let far = log1p(s + u / (one + q)) / s;
+    L::select(u.lt(L::new(0.01)), series, far)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn worst<R: Real>(points: impl Iterator<Item = f64>, f: impl Fn(R) -> R, exact: impl Fn(f64) -> f64) -> f64 {
+        points
+            .map(|x| R::from_f64(x))
+            .map(|x| (f(x).to_f64() / exact(x.to_f64()) - 1.0).abs())
+            .fold(0.0, f64::max)
+    }
+
+    fn powers() -> impl Iterator<Item = f64> {
+        (0..4000).map(|i| libm::pow(10.0, -7.0 + 0.00225 * i as f64))
+    }
+
+    #[test]
+    fn logarithms_hold_their_relative_error() {
+        let (f, d) = (worst::<f32>(powers(), ln, libm::log), worst::<f64>(powers(), ln, libm::log));
+        println!("ln: relative error {f:.1e} (f32) {d:.1e} (f64)");
+        assert!(f < 3e-7 && d < 6e-16, "{f:e} {d:e}");
+        let small = || powers().chain(powers().map(|x| -x.min(0.99)));
+        let (f, d) = (worst::<f32>(small(), log1p, libm::log1p), worst::<f64>(small(), log1p, libm::log1p));
+        println!("log1p: relative error {f:.1e} (f32) {d:.1e} (f64)");
+        assert!(f < 5e-7 && d < 1e-15, "{f:e} {d:e}");
+    }
+
+    #[test]
+    fn exponential_and_asinh_hold_their_relative_error() {
+        let points = || (-3000..3000).map(|i| i as f64 * 0.01);
+        let (f, d) = (worst::<f32>(points(), exp, libm::exp), worst::<f64>(points(), exp, libm::exp));
+        println!("exp: relative error {f:.1e} (f32) {d:.1e} (f64)");
+        assert!(f < 3e-7 && d < 6e-16, "{f:e} {d:e}");
+        let exact = |u: f64| libm::asinh(libm::sqrt(u)) / libm::sqrt(u);
+        let (f, d) = (worst::<f32>(powers(), asinh_ratio, exact), worst::<f64>(powers(), asinh_ratio, exact));
+        println!("asinh(√u)/√u: relative error {f:.1e} (f32) {d:.1e} (f64)");
+        assert!(f < 5e-7 && d < 1e-15, "{f:e} {d:e}");
+    }
+}

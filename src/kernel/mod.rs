@@ -1,0 +1,11 @@
+//! What both backends share: scalars and lanes, elementary functions, positions, buffers, stages and plans.
+//! A kernel is written once over [`lane::Lane`] and runs as f32 or f64, one item or a whole register at a time.
+
+pub mod buffer;
+pub mod lane;
+pub mod math;
+pub mod node;
+pub mod position;
+pub mod row;
+pub mod stage;
+pub mod vector;

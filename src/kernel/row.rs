@@ -1,0 +1,38 @@
+//! The row of schedule data that one time step needs. Everything else is in buffers.
+
+use super::lane::Real;
+use bytemuck::{Pod, Zeroable};
+
+/// What the schedule prescribes at one step. Units: mm, s.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Row<R> {
+    /// F̄ − I, rows first.
+    pub gradient: [[R; 3]; 3],
+    /// Ḟ̄ over the last half step, 1/s.
+    pub rate: [[R; 3]; 3],
+    /// Step from this position to the next, s.
+    pub dt: R,
+    /// Mean of the last and this step, s: the step of the velocity.
+    pub dt_mid: R,
+    /// Share of the thermal strain that acts.
+    pub thermal: R,
+    /// Its increment since the step before.
+    pub thermal_increment: R,
+    /// Contact radius over full radius.
+    pub radius: R,
+    /// Its increment since the step before.
+    pub radius_increment: R,
+    /// Damping rate of solids, 1/s.
+    pub damping_solid: R,
+    /// Damping rate of threads, 1/s.
+    pub damping_thread: R,
+    /// Acceleration of the amplitude of prescribed motion, 1/s².
+    pub motion: R,
+    pub reserved: [R; 5],
+}
+
+// SAFETY: `repr(C)`, one scalar type throughout, hence no padding.
+unsafe impl<R: Zeroable> Zeroable for Row<R> {}
+// SAFETY: as above, and every bit pattern of R is valid.
+unsafe impl<R: Real> Pod for Row<R> {}

@@ -1,0 +1,56 @@
+//! Constitutive laws of yarns. A law is one file with its WGSL twin, an arm of [`Law`], and a row in the materials test.
+
+pub mod charmetant;
+pub mod neo_hookean;
+
+use crate::case::fabric::Material as Choice;
+use crate::kernel::lane::Lane;
+
+/// A 3 × 3 tensor, rows first.
+pub type Tensor<L> = [[L; 3]; 3];
+
+/// Numbers that a law may keep in its row of the material table.
+pub const PARAMETERS: usize = 8;
+
+/// A hyperelastic law in the frame of the fibre (axis 1), from the displacement gradient H = F − I: forming strains from
+/// H loses nothing to cancellation at small strain.
+pub trait Material: 'static {
+    /// First Piola–Kirchhoff stress, MPa.
+    fn stress<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> Tensor<L>;
+    /// Strain energy per reference volume, MPa, by mode (elongation, compaction, distortion, longitudinal shear).
+    fn energy<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> [L; 4];
+    /// Upper estimate of the tangent stiffness in every direction that fibre lines do not cover, MPa.
+    fn stiffness<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> L;
+}
+
+/// The laws there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Law {
+    Charmetant,
+    NeoHookean,
+}
+
+/// The law a user chose, its row of the material table, and its stiffness along the fibre in MPa.
+pub fn choose(choice: &Choice) -> (Law, [f64; PARAMETERS], f64) {
+    match *choice {
+        Choice::Charmetant { k_elong_mpa, k_comp_mpa, p_comp, k_dist_mpa, k_sh_mpa, compaction_cap } => (
+            Law::Charmetant,
+            charmetant::parameters(k_elong_mpa, k_comp_mpa, p_comp, k_dist_mpa, k_sh_mpa, compaction_cap),
+            k_elong_mpa,
+        ),
+        Choice::NeoHookean { young_mpa, poisson } => {
+            (Law::NeoHookean, neo_hookean::parameters(young_mpa, poisson), neo_hookean::longitudinal(young_mpa, poisson))
+        }
+    }
+}
+
+/// Determinant of I + H.
+#[inline(always)]
+pub fn jacobian<L: Lane>(h: &Tensor<L>) -> L {
+    let one = L::new(1.0);
+    let (a, b, c) = (one + h[0][0], one + h[1][1], one + h[2][2]);
+    let x = b * c - h[1][2] * h[2][1];
+    let y = h[1][0] * c - h[1][2] * h[2][0];
+    let z = h[1][0] * h[2][1] - b * h[2][0];
+    a * x - h[0][1] * y + h[0][2] * z
+}
