@@ -3,3 +3,5 @@
 pub mod case;
 pub mod error;
 pub mod mesh;
+pub mod output;
+pub mod run;

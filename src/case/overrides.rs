@@ -59,7 +59,8 @@ impl Override {
     fn entry<'a>(&self, items: &'a mut [Value], name: &str, parent: &str) -> Result<&'a mut Value> {
         let count = items.len();
         let entry = name.parse::<usize>().ok().and_then(|i| items.get_mut(i));
-        entry.ok_or_else(|| self.error(format!("no entry `{name}` in the list `{parent}`, which holds {count}, from 0")))
+        entry
+            .ok_or_else(|| self.error(format!("no entry `{name}` in the list `{parent}`, which holds {count}, from 0")))
     }
 
     fn field<'a>(

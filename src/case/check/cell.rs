@@ -32,7 +32,8 @@ fn yarn(name: &str, yarn: &Yarn, origin: &Origin) -> Result<()> {
         return Err(origin.error(&format!("fabric.{name}.width_mm"), message));
     }
     if thickness > width {
-        let message = format!("{thickness} mm is more than the width_mm of {width}, give a yarn that is wider than thick");
+        let message =
+            format!("{thickness} mm is more than the width_mm of {width}, give a yarn that is wider than thick");
         return Err(origin.error(&format!("fabric.{name}.thickness_mm"), message));
     }
     Ok(())
@@ -61,17 +62,20 @@ fn size(case: &Case, fabric: &Fabric, [warps, wefts]: [usize; 2], origin: &Origi
     let lengths = [warps as f64 * fabric.warp.pitch_mm, wefts as f64 * fabric.weft.pitch_mm];
     for (name, count, length) in [("warps", warps, lengths[0]), ("wefts", wefts, lengths[1])] {
         if length > MAX_POSITION_MM {
-            let message =
-                format!("{count} make a cell of {length} mm, at most {MAX_POSITION_MM} mm: use fewer, cells are periodic");
+            let message = format!(
+                "{count} make a cell of {length} mm, at most {MAX_POSITION_MM} mm: use fewer, cells are periodic"
+            );
             return Err(origin.error(&format!("domain.cell.{name}"), message));
         }
     }
     let resolution = &case.resolution;
     let slices = lengths.map(|length| (length / resolution.slice_mm).round().max(1.0));
-    let sections = [warps * resolution.warp_columns, wefts * resolution.weft_columns].map(|n| (n * resolution.layers) as f64);
+    let sections =
+        [warps * resolution.warp_columns, wefts * resolution.weft_columns].map(|n| (n * resolution.layers) as f64);
     let hexes = sections[0] * slices[1] + sections[1] * slices[0];
     if hexes > MAX_HEXES {
-        let message = format!("makes {hexes:.2e} hexahedra, at most {MAX_HEXES:e}: use longer slices or fewer columns, layers");
+        let message =
+            format!("makes {hexes:.2e} hexahedra, at most {MAX_HEXES:e}: use longer slices or fewer columns, layers");
         return Err(origin.error("resolution", message));
     }
     let beams = (warps * wefts * resolution.beams_per_lap) as f64;
