@@ -20,12 +20,13 @@ fn at(value: &Value, shape: Shape, path: &mut Vec<String>) -> Result<(), Fault> 
     let forms = shape.forms();
     let fitting: Vec<Shape> = forms.iter().copied().filter(|form| fits(value, form)).collect();
     let Some(&form) = fitting.first() else {
-        return fault(path, format!("{} is {}, expected {}", brief(value), kind(value), expected(&forms)));
+        let found = if value.is_null() { "null".into() } else { format!("{} is {}", brief(value), kind(value)) };
+        return fault(path, format!("{found}, expected {}{}", expected(&forms), meaning(shape)));
     };
     match value {
         Value::Object(fields) if fitting.len() > 1 => tagged(fields, &fitting, path),
         Value::Object(fields) => object(fields, form, path),
-        Value::Array(items) => list(items, form, path),
+        Value::Array(items) => list(items, form, shape, path),
         Value::String(text) => string(text, shape, &fitting, path),
         Value::Number(number) => {
             let limit = |keyword| form.get(keyword).and_then(Value::as_f64);
@@ -79,7 +80,7 @@ fn object(fields: &Map<String, Value>, form: Shape, path: &mut Vec<String>) -> R
     }
 }
 
-fn list(items: &[Value], form: Shape, path: &mut Vec<String>) -> Result<(), Fault> {
+fn list(items: &[Value], form: Shape, shape: Shape, path: &mut Vec<String>) -> Result<(), Fault> {
     let limit = |keyword| form.get(keyword).and_then(Value::as_u64).map(|n| n as usize);
     let (low, high) = (limit("minItems").unwrap_or(0), limit("maxItems").unwrap_or(usize::MAX));
     if !(low..=high).contains(&items.len()) {
@@ -88,7 +89,7 @@ fn list(items: &[Value], form: Shape, path: &mut Vec<String>) -> Result<(), Faul
             (_, usize::MAX) => format!("at least {low}"),
             _ => format!("{low} to {high}"),
         };
-        return fault(path, format!("a list of length {}, expected length {range}", items.len()));
+        return fault(path, format!("a list of length {}, expected length {range}{}", items.len(), meaning(shape)));
     }
     let Some(item) = form.items() else { return Ok(()) };
     for (i, value) in items.iter().enumerate() {

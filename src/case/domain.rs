@@ -95,7 +95,7 @@ pub struct InlineThread {
     #[schemars(length(min = 1, max = 100))]
     pub name: String,
     /// Nodes in order, mm; at least 2.
-    #[schemars(length(min = 2, max = 10_000_000))]
+    #[schemars(length(min = 2, max = 10_000_000), inner(inner(range(min = -250, max = 250))))]
     pub nodes: Vec<[f64; 3]>,
     /// Radius for contact, mm.
     #[schemars(range(min = 0.001, max = 50))]

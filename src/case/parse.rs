@@ -14,10 +14,6 @@ pub const MAX_BYTES: u64 = 64 << 20;
 pub fn file(path: &Path) -> Result<Value> {
     let bytes = read(path).map_err(|message| Error::file(path, message))?;
     let place = path.display();
-    if bytes.len() as u64 > MAX_BYTES {
-        let message = format!("larger than {} MiB: is this a case or a fabric?", MAX_BYTES >> 20);
-        return Err(Error::case(place.to_string(), message));
-    }
     let text = std::str::from_utf8(&bytes).map_err(|e| {
         let message = format!("not UTF-8 text at byte {}: save the file as UTF-8", e.valid_up_to());
         Error::case(place.to_string(), message)
@@ -43,9 +39,12 @@ fn read(path: &Path) -> std::result::Result<Vec<u8>, String> {
     if !metadata.is_file() {
         return Err("is not a file".into());
     }
+    if metadata.len() > MAX_BYTES {
+        return Err(format!("is larger than {} MiB, is this a case or a fabric?", MAX_BYTES >> 20));
+    }
     let file = std::fs::File::open(path).map_err(|e| reason(&e))?;
     let mut bytes = Vec::new();
-    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|e| reason(&e))?;
+    file.take(MAX_BYTES).read_to_end(&mut bytes).map_err(|e| reason(&e))?;
     Ok(bytes)
 }
 
@@ -64,8 +63,12 @@ fn explain(error: &serde_json::Error, text: &str) -> String {
     let message = message.strip_suffix(&position).unwrap_or(&message);
     let line = text.lines().nth(error.line().saturating_sub(1)).unwrap_or_default();
     let rest: String = line.chars().skip(error.column().saturating_sub(1)).collect();
-    let hint = if rest.starts_with(['/', '#']) {
+    let hint = if error.is_eof() {
+        ": the file ends too early, is it complete?"
+    } else if rest.starts_with(['/', '#']) {
         ": JSON has no comments"
+    } else if message == "key must be a string" && rest.starts_with(|c: char| c.is_ascii_digit()) {
+        ": decimals are written with a point"
     } else if ["NaN", "nan", "aN", "Infinity", "inf", "-Inf", "Inf"].iter().any(|word| rest.starts_with(word)) {
         ": NaN and infinity are not numbers"
     } else if rest.starts_with('\'') {
@@ -131,5 +134,32 @@ impl<'de> Visitor<'de> for StrictVisitor {
             fields.insert(name, value);
         }
         Ok(Value::Object(fields))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn reads_values_as_serde_json_does() {
+        let text = r#"{ "a": [1, -2, 3.5, 18446744073709551615], "b": { "c": null, "d": true }, "é": "\u00e9" }"#;
+        assert_eq!(parse(text).unwrap(), serde_json::from_str::<Value>(text).unwrap());
+    }
+
+    #[test]
+    fn refuses_names_given_twice_at_any_depth() {
+        assert!(parse(r#"{ "a": [{ "b": 1, "b": 1 }] }"#).unwrap_err().to_string().starts_with("`b` is given twice"));
+    }
+
+    #[test]
+    fn accepts_a_byte_order_mark_and_refuses_huge_files() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("case.json");
+        std::fs::write(&path, "\u{feff}{}").unwrap();
+        assert_eq!(file(&path).unwrap(), json!({}));
+        std::fs::File::create(&path).unwrap().set_len(MAX_BYTES + 1).unwrap();
+        assert!(file(&path).unwrap_err().to_string().ends_with("larger than 64 MiB, is this a case or a fabric?"));
     }
 }

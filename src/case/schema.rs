@@ -41,8 +41,10 @@ impl<'a> Shape<'a> {
     /// The first sentence of the description, without its full stop.
     pub fn description(&self) -> &'a str {
         let text = self.get("description").and_then(Value::as_str).unwrap_or_default();
-        let end = text.find(". ").or(text.find(".\n")).unwrap_or(text.len());
-        text[..end].trim_end_matches('.')
+        // "Eq. 14" does not end a sentence, ". Default" does.
+        let ends = |i: &usize| text[i + 1..].trim_start().starts_with(|c: char| c.is_uppercase());
+        let end = text.match_indices(". ").chain(text.match_indices(".\n")).map(|(i, _)| i).filter(ends).min();
+        text[..end.unwrap_or(text.len())].trim_end_matches('.')
     }
 
     /// The forms a value may take here: references followed, alternatives flattened.

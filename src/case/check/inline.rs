@@ -1,6 +1,6 @@
 //! A mesh written out in the case: sizes, shapes, names, and what the conditions catch.
 
-use super::{MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM};
+use super::{MAX_BEAMS, MAX_HEXES};
 use crate::case::Case;
 use crate::case::domain::{Condition, InlineBlock, InlineMesh, InlineThread};
 use crate::case::origin::Origin;
@@ -12,7 +12,9 @@ const TOLERANCE_MM: f64 = 1e-6;
 
 pub fn check(case: &Case, mesh: &InlineMesh, origin: &Origin) -> Result<()> {
     if case.fabric.is_some() {
-        return Err(origin.error("fabric", "is not used by domain.mesh, which holds its own materials: remove it"));
+        return Err(
+            origin.error("domain.mesh", "holds its own materials, so that the fabric is not used: remove fabric")
+        );
     }
     if mesh.blocks.is_empty() && mesh.threads.is_empty() {
         return Err(origin.error("domain.mesh", "holds neither blocks nor threads, give at least one"));
@@ -112,10 +114,6 @@ fn hexes(nodes: &[[f64; 3]], elements: [usize; 3], path: &str, origin: &Origin) 
 
 fn thread(thread: &InlineThread, path: &str, origin: &Origin) -> Result<()> {
     for (i, node) in thread.nodes.iter().enumerate() {
-        if node.iter().any(|x| x.abs() > MAX_POSITION_MM) {
-            let message = format!("{node:?} lies outside ±{MAX_POSITION_MM} mm, move the scene to the origin");
-            return Err(origin.error(&format!("{path}.nodes.{i}"), message));
-        }
         if i > 0 && difference(*node, thread.nodes[i - 1]).iter().all(|d| d.abs() < TOLERANCE_MM) {
             let message = format!("{node:?} repeats the node before it, a beam needs a length: remove one");
             return Err(origin.error(&format!("{path}.nodes.{i}"), message));
