@@ -164,6 +164,7 @@ fn perform(command: Command) -> Result<Done> {
                 force,
                 quiet,
             };
+            directory::check(&options.output, force)?;
             let outcome = run::run(&loaded, &options)?;
             let code = if outcome.interrupted { INTERRUPTED } else { 0 };
             return Ok(Done { text: outcome.to_string(), code });

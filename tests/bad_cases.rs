@@ -74,6 +74,22 @@ fn the_program_leaves_results_alone_when_the_case_is_bad() {
 }
 
 #[test]
+fn results_are_not_overwritten_without_force() {
+    let root = tempfile::tempdir().unwrap();
+    let case = fs::canonicalize(GOOD).unwrap();
+    fs::write(root.path().join("file"), "mine").unwrap();
+    fs::create_dir(root.path().join("old")).unwrap();
+    fs::write(root.path().join("old/summary.json"), "{}").unwrap();
+    let run = |dir: &str| one_line(&tricot(&["run", case.to_str().unwrap(), "-o", dir], root.path()), 4);
+    assert!(run("old").starts_with("error: old: the folder is not empty"));
+    assert!(run("file").starts_with("error: file: is in the way"));
+    assert!(run("file/below").starts_with("error: file: is in the way"));
+    assert_eq!(fs::read(root.path().join("old/summary.json")).unwrap(), b"{}");
+    assert_eq!(fs::read(root.path().join("file")).unwrap(), b"mine");
+    assert_eq!(fs::read_dir(root.path()).unwrap().count(), 2);
+}
+
+#[test]
 fn the_command_line_is_checked() {
     let here = Path::new(".");
     assert!(one_line(&tricot(&["run"], here), 2).contains("<CASE>"));

@@ -27,24 +27,36 @@ pub fn default(case: &Path) -> PathBuf {
     Path::new("results").join(case.file_stem().unwrap_or("case".as_ref()))
 }
 
+/// Whether [`prepare`] would accept `dir`, as far as can be seen without changing anything: no file in the way, and empty
+/// unless `force` is given. Call it before long work.
+pub fn check(dir: &Path, force: bool) -> Result<()> {
+    let in_the_way = |path| Error::file(path, "is in the way and not a folder, choose another one with -o");
+    if fs::symlink_metadata(dir).is_err() {
+        return match dir.ancestors().skip(1).find(|above| above.exists()) {
+            Some(above) if !above.is_dir() => Err(in_the_way(above)),
+            _ => Ok(()),
+        };
+    }
+    if !dir.is_dir() {
+        return Err(in_the_way(dir));
+    }
+    if force || list(dir)?.is_empty() {
+        return Ok(());
+    }
+    let message = "the folder is not empty: choose another one with -o, or give --force to move earlier results aside";
+    Err(Error::file(dir, message))
+}
+
 /// Makes `dir` ready for a run. Call it once the case has been checked and its mesh built, so that bad input never
 /// touches earlier results.
 ///
 /// A folder that holds anything is refused unless `force` is given; then what an earlier run wrote there is moved to
 /// `dir/previous-1` (or the next free number), and everything else stays where it is.
 pub fn prepare(dir: &Path, force: bool) -> Result<()> {
-    if fs::symlink_metadata(dir).is_ok() && !dir.is_dir() {
-        return Err(Error::file(dir, "is in the way and not a folder, choose another one with -o"));
-    }
+    check(dir, force)?;
     fs::create_dir_all(dir).map_err(|e| Error::file(dir, format!("cannot create the folder: {}", reason(&e))))?;
-    let entries = list(dir)?;
-    if !entries.is_empty() && !force {
-        let message =
-            "the folder is not empty: choose another one with -o, or give --force to move earlier results aside";
-        return Err(Error::file(dir, message));
-    }
     writable(dir)?;
-    let own: Vec<PathBuf> = entries.into_iter().filter(|path| is_own(path)).collect();
+    let own: Vec<PathBuf> = list(dir)?.into_iter().filter(|path| is_own(path)).collect();
     if own.is_empty() {
         return Ok(());
     }
@@ -132,7 +144,8 @@ mod tests {
         let file = root.path().join("file");
         fs::write(&file, "mine").unwrap();
         assert!(prepare(&file, true).unwrap_err().to_string().contains("not a folder"));
-        assert!(prepare(&file.join("below"), true).unwrap_err().to_string().contains("cannot create"));
+        let message = prepare(&file.join("below/further"), true).unwrap_err().to_string();
+        assert!(message.contains("file: is in the way"), "{message}");
         assert_eq!(fs::read(&file).unwrap(), b"mine");
     }
 
