@@ -193,6 +193,9 @@ fn picture_path(source: &Path) -> PathBuf {
 
 /// The first paragraph of a message about the command line, on one line.
 fn usage(error: &clap::Error) -> String {
+    if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        return "no command given (try --help)".into();
+    }
     let text = error.to_string();
     let first: Vec<&str> = text.lines().take_while(|l| !l.is_empty()).map(str::trim).collect();
     format!("{} (try --help)", first.join(" ").trim_start_matches("error: "))

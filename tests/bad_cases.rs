@@ -92,6 +92,7 @@ fn results_are_not_overwritten_without_force() {
 #[test]
 fn the_command_line_is_checked() {
     let here = Path::new(".");
+    assert_eq!(one_line(&tricot(&[], here), 2), "error: no command given (try --help)\n");
     assert!(one_line(&tricot(&["run"], here), 2).contains("<CASE>"));
     assert!(one_line(&tricot(&["walk"], here), 2).contains("walk"));
     assert!(one_line(&tricot(&["run", GOOD, "--threads", "0"], here), 2).contains("1..=1024"));
