@@ -1,9 +1,15 @@
 //! Explicit finite elements for dry stitched non-crimp fabrics at the scale of their yarns.
 
 pub mod case;
-pub mod error;
-pub mod mesh;
-pub mod kernel;
-pub mod materials; pub mod elements;
-pub mod dynamics; pub mod conditions;
+pub mod conditions;
 pub mod contact;
+pub mod dynamics;
+pub mod elements;
+pub mod error;
+pub mod fabric;
+pub mod kernel;
+pub mod materials;
+pub mod measure;
+pub mod mesh;
+pub mod output;
+pub mod run;

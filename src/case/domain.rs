@@ -12,9 +12,11 @@ pub enum Domain {
     Cell {
         /// Number of warp yarns, at least 2. Default 2.
         #[serde(default = "warps")]
+        #[schemars(range(min = 2, max = 2000))]
         warps: usize,
         /// Number of weft yarns: even (a tricot repeats after two courses), at least 2. Default 4.
         #[serde(default = "wefts")]
+        #[schemars(range(min = 2, max = 2000))]
         wefts: usize,
     },
     /// A mesh written out in the case, for verification scenes.
@@ -40,6 +42,7 @@ pub struct InlineMesh {
     pub threads: Vec<InlineThread>,
     /// Coulomb friction coefficient of every contact. Default 0.
     #[serde(default)]
+    #[schemars(range(min = 0, max = 2))]
     pub friction: f64,
     /// Conditions on nodes.
     #[serde(default)]
@@ -51,25 +54,32 @@ pub struct InlineMesh {
 #[serde(deny_unknown_fields)]
 pub struct InlineBlock {
     /// Name for messages and reports.
+    #[schemars(length(min = 1, max = 100))]
     pub name: String,
     /// Elements along the fibre, across it, and through the thickness: `[slices, columns, layers]`, each at least 1.
+    #[schemars(inner(range(min = 1, max = 1_000_000)))]
     pub elements: [usize; 3],
     /// Opposite corners of a straight block `[[x, y, z], [x, y, z]]`, mm: fibres along x, columns along y, layers along z.
     /// Give either this or `nodes`.
     #[serde(default)]
+    #[schemars(inner(inner(range(min = -250, max = 250))))]
     pub corners: Option<[[f64; 3]; 2]>,
     /// Every node, mm, slices fastest, then columns, then layers.
     #[serde(default)]
+    #[schemars(inner(inner(range(min = -250, max = 250))))]
     pub nodes: Option<Vec<[f64; 3]>>,
     /// Fibre direction. Default `[1, 0, 0]`.
     #[serde(default = "fibre")]
+    #[schemars(inner(range(min = -1000, max = 1000)))]
     pub fibre: [f64; 3],
     /// Density, tonne/mm³.
+    #[schemars(range(min = 1e-15, max = 1e-6))]
     pub density_t_mm3: f64,
     /// Constitutive law.
     pub material: Material,
     /// Velocity of every node at the start, mm/s. Default zero.
     #[serde(default)]
+    #[schemars(inner(range(min = -1e7, max = 1e7)))]
     pub velocity_mm_s: [f64; 3],
 }
 
@@ -82,26 +92,35 @@ fn fibre() -> [f64; 3] {
 #[serde(deny_unknown_fields)]
 pub struct InlineThread {
     /// Name for messages and reports.
+    #[schemars(length(min = 1, max = 100))]
     pub name: String,
     /// Nodes in order, mm; at least 2.
+    #[schemars(length(min = 2, max = 10_000_000), inner(inner(range(min = -250, max = 250))))]
     pub nodes: Vec<[f64; 3]>,
     /// Radius for contact, mm.
+    #[schemars(range(min = 0.001, max = 50))]
     pub radius_mm: f64,
     /// Axial stiffness EA, N.
+    #[schemars(range(min = 1e-6, max = 1e9))]
     pub axial_n: f64,
     /// Bending stiffness, N·mm². Default 0.
     #[serde(default)]
+    #[schemars(range(min = 0, max = 1e9))]
     pub bending_n_mm2: f64,
     /// Share of the given curvature that is stress-free, 0 to 1. Default 1.
     #[serde(default = "rest_curvature")]
+    #[schemars(range(min = 0, max = 1))]
     pub rest_curvature: f64,
     /// Mass per length, tex (g/km).
+    #[schemars(range(min = 0.001, max = 1e7))]
     pub linear_density_tex: f64,
     /// Thermal strain at the end of a pretension step. Default 0.
     #[serde(default)]
+    #[schemars(range(min = -0.9, max = 0.5))]
     pub thermal_strain: f64,
     /// Velocity of every node at the start, mm/s. Default zero.
     #[serde(default)]
+    #[schemars(inner(range(min = -1e7, max = 1e7)))]
     pub velocity_mm_s: [f64; 3],
 }
 
@@ -114,6 +133,7 @@ fn rest_curvature() -> f64 {
 #[serde(deny_unknown_fields)]
 pub struct Condition {
     /// Nodes whose reference position lies in this box `[[x, y, z], [x, y, z]]` (bounds included, 1e-6 mm tolerance), mm.
+    #[schemars(inner(inner(range(min = -1e6, max = 1e6))))]
     pub within: [[f64; 3]; 2],
     /// Restrict to one block or thread, by name. Default: every body.
     #[serde(default)]
@@ -123,6 +143,7 @@ pub struct Condition {
     pub components: [bool; 3],
     /// Displacement at the end of the `move` steps, mm. Default zero: the nodes are held.
     #[serde(default)]
+    #[schemars(inner(range(min = -250, max = 250)))]
     pub displacement_mm: [f64; 3],
 }
 
@@ -135,14 +156,19 @@ fn all() -> [bool; 3] {
 #[serde(deny_unknown_fields, default)]
 pub struct Resolution {
     /// Hexahedra across a warp yarn. Default 18.
+    #[schemars(range(min = 1, max = 1000))]
     pub warp_columns: usize,
     /// Hexahedra across a weft yarn. Default 8.
+    #[schemars(range(min = 1, max = 1000))]
     pub weft_columns: usize,
     /// Hexahedra through the thickness of a yarn. Default 2.
+    #[schemars(range(min = 1, max = 100))]
     pub layers: usize,
     /// Length of a hexahedron along the fibre, mm; rounded to a whole number over the cell. Default 0.303.
+    #[schemars(range(min = 0.001, max = 50))]
     pub slice_mm: f64,
     /// Beams per lap (a loop and its underlap), graded by curvature. Default 60.
+    #[schemars(range(min = 8, max = 10_000))]
     pub beams_per_lap: usize,
 }
 

@@ -19,8 +19,10 @@ pub struct Effects {
     /// Nodal mass added only where and while contact or crushed elements would limit the time step. `null` turns it off.
     pub contact_mass: Option<ContactMass>,
     /// Floor on nodal mass, as a share of the body's mean nodal mass: light nodes at truncated edges and short beams. 0 turns it off. Default 0.5.
+    #[schemars(range(min = 0, max = 1))]
     pub mass_floor: f64,
     /// Gravity, mm/s². `null` (the default) turns it off.
+    #[schemars(inner(range(min = -1e7, max = 1e7)))]
     pub gravity_mm_s2: Option<[f64; 3]>,
 }
 
@@ -49,23 +51,30 @@ pub struct Contact {
     /// Threads against threads. Default true.
     pub thread_thread: bool,
     /// Penalty of a thread per length, N/mm². Default 140 (30 N/mm at a node of 0.22 mm).
+    #[schemars(range(min = 1e-6, max = 1e9))]
     pub thread_penalty_n_mm2: f64,
     /// Penalty of a yarn surface per area, N/mm³. Default 65 (5 N/mm at a node of 0.078 mm²).
+    #[schemars(range(min = 1e-6, max = 1e9))]
     pub yarn_penalty_n_mm3: f64,
     /// Penalty of a pair of beams, N/mm. Default 30.
     pub thread_thread_penalty_n_mm: f64,
     /// Coulomb friction with true stick. The coefficient belongs to the fabric. Default true.
     pub friction: bool,
     /// Tangential over normal penalty, above 0 to 1. Default 0.5.
+    #[schemars(range(min = 0.001, max = 1))]
     pub tangential_ratio: f64,
     /// Damping of the normal approach, as a share of critical. Default 0.1.
+    #[schemars(range(min = 0, max = 1))]
     pub damping_ratio: f64,
     /// Distance beyond touching at which pairs become candidates, mm. Default 0.06.
+    #[schemars(range(min = 1e-4, max = 5))]
     pub skin_mm: f64,
     /// Beams of one thread closer than this along it do not touch each other, mm. Default 0.4.
+    #[schemars(range(min = 0, max = 100))]
     pub self_contact_arc_mm: f64,
     /// Contact radius of threads at the start of pre-tension over the full radius, above 0 to 1; it grows over the first
     /// half of pre-tension. Below 1 for threads that start inside a yarn. Default 1.
+    #[schemars(range(min = 0.05, max = 1))]
     pub initial_radius_ratio: f64,
 }
 
@@ -93,8 +102,10 @@ impl Default for Contact {
 #[serde(deny_unknown_fields, default)]
 pub struct Damping {
     /// Rate for every node, 1/s. Default 2000.
+    #[schemars(range(min = 0, max = 1e7))]
     pub rate_per_s: f64,
     /// Rate for threads during pretension and settle steps, 1/s. Default 20000.
+    #[schemars(range(min = 0, max = 1e7))]
     pub thread_settle_rate_per_s: f64,
 }
 
@@ -109,6 +120,7 @@ impl Default for Damping {
 #[serde(deny_unknown_fields, default)]
 pub struct FibreLines {
     /// Strength β of the added inertia β dt² K; at least 0.25. Default 0.5.
+    #[schemars(range(min = 0.25, max = 100))]
     pub beta: f64,
     /// Also along threads. Default true.
     pub threads: bool,
@@ -125,8 +137,10 @@ impl Default for FibreLines {
 #[serde(deny_unknown_fields, default)]
 pub struct ContactMass {
     /// Factor on the mass dt²/4·K that contact at a node calls for. Default 1.
+    #[schemars(range(min = 0, max = 100))]
     pub factor: f64,
     /// Share of the added mass that remains after each step once contact is lost, 0 to 1. Default 0.95.
+    #[schemars(range(min = 0, max = 1))]
     pub memory: f64,
 }
 

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Fabric {
     /// Name for reports.
+    #[schemars(length(min = 1, max = 200))]
     pub name: String,
     /// Yarns along y, on the zig-zag face (z > 0).
     pub warp: Yarn,
@@ -16,9 +17,11 @@ pub struct Fabric {
     /// The thread that binds both plies.
     pub stitch: Stitch,
     /// Coulomb friction coefficient of every contact, 0 to 2. Paper: 0.2.
+    #[schemars(range(min = 0, max = 2))]
     pub friction: f64,
     /// Distance between the two plies before pre-tension, mm. Default 0.
     #[serde(default)]
+    #[schemars(range(min = 0, max = 10))]
     pub ply_gap_mm: f64,
 }
 
@@ -27,15 +30,20 @@ pub struct Fabric {
 #[serde(deny_unknown_fields)]
 pub struct Yarn {
     /// Distance between neighbouring yarns, centre to centre, mm.
+    #[schemars(range(min = 0.1, max = 100))]
     pub pitch_mm: f64,
     /// Width of the truncated section before pre-tension, mm.
+    #[schemars(range(min = 0.05, max = 100))]
     pub width_mm: f64,
     /// Thickness at the centre before pre-tension, mm.
+    #[schemars(range(min = 0.01, max = 20))]
     pub thickness_mm: f64,
     /// Truncated width over full width of the ellipse, 0.5 to 0.99. Default 0.95.
     #[serde(default = "truncation")]
+    #[schemars(range(min = 0.5, max = 0.99))]
     pub truncation: f64,
     /// Mass of the ply per area, g/m². Sets the density, whatever the mesh. Paper: 300.
+    #[schemars(range(min = 1, max = 10000))]
     pub areal_mass_g_m2: f64,
     /// Constitutive law of the yarn.
     pub material: Material,
@@ -52,25 +60,33 @@ pub enum Material {
     /// Transversely isotropic hyperelastic law of fibre bundles (Charmetant et al.; Eqs 4 to 7 of the paper).
     Charmetant {
         /// Tensile stiffness along the fibres, MPa. Paper: 108500.
+        #[schemars(range(min = 0.001, max = 1e7))]
         k_elong_mpa: f64,
         /// Stiffness of cross-sectional compaction, MPa. Paper: 1.25.
+        #[schemars(range(min = 0, max = 1e6))]
         k_comp_mpa: f64,
         /// Exponent of cross-sectional compaction, above 1. Paper: 1.84.
+        #[schemars(range(min = 1.01, max = 10))]
         p_comp: f64,
         /// Transverse shear (distortion) stiffness, MPa. Paper: 0.6.
+        #[schemars(range(min = 0, max = 1e6))]
         k_dist_mpa: f64,
         /// Longitudinal shear stiffness, MPa. Paper: 2.2.
+        #[schemars(range(min = 0, max = 1e6))]
         k_sh_mpa: f64,
         /// Compaction |I_comp| below which the power is replaced by a parabola, since its tangent is infinite at
         /// zero for exponents below 2. 0 turns it off. Default 1e-3.
         #[serde(default = "compaction_cap")]
+        #[schemars(range(min = 0, max = 0.1))]
         compaction_cap: f64,
     },
     /// Compressible neo-Hookean solid, for verification.
     NeoHookean {
         /// Young's modulus at small strain, MPa.
+        #[schemars(range(min = 0.001, max = 1e7))]
         young_mpa: f64,
         /// Poisson's ratio at small strain, 0 to 0.49.
+        #[schemars(range(min = 0, max = 0.49))]
         poisson: f64,
     },
 }
@@ -90,31 +106,41 @@ pub struct Stitch {
     #[serde(default)]
     pub lap: Lap,
     /// Radius of the thread's envelope, for contact, mm. Paper: 0.1.
+    #[schemars(range(min = 0.001, max = 5))]
     pub radius_mm: f64,
     /// Young's modulus on the area of the envelope, MPa: EA is the measured quantity. Paper: 350.
+    #[schemars(range(min = 0.001, max = 1e7))]
     pub young_mpa: f64,
     /// Bending stiffness, N·mm². Paper: 5.6e-4.
+    #[schemars(range(min = 0, max = 1000))]
     pub bending_n_mm2: f64,
     /// Mass per length, tex (g/km). Only sets inertia. Default: 43.4, a solid polyester thread of 0.1 mm radius,
     /// as in the paper; a real 76 dtex thread has 7.6.
     #[serde(default = "linear_density")]
+    #[schemars(range(min = 0.01, max = 1e5))]
     pub linear_density_tex: f64,
     /// Thermal strain that tightens the stitch, additive (Eq. 14). Paper: −0.15.
+    #[schemars(range(min = -0.9, max = 0.5))]
     pub thermal_strain: f64,
     /// Share of the generated curvature that is stress-free: 1 threads rest as generated (as in Abaqus), 0 straight. Default 1.
     #[serde(default = "rest_curvature")]
+    #[schemars(range(min = 0, max = 1))]
     pub rest_curvature: f64,
     /// Initial clearance between thread surface and yarn surface, mm. Default 0.01.
     #[serde(default = "clearance_yarn")]
+    #[schemars(range(min = 0, max = 5))]
     pub clearance_yarn_mm: f64,
     /// Initial clearance between two thread surfaces, mm. Slack in the loops: it takes up part of the thermal strain. Default 0.03.
     #[serde(default = "clearance_thread")]
+    #[schemars(range(min = 0, max = 5))]
     pub clearance_thread_mm: f64,
     /// Largest inward shift of the legs of a loop in the warp gap, mm. Default 0.12.
     #[serde(default = "leg_shift")]
+    #[schemars(range(min = 0, max = 10))]
     pub leg_shift_mm: f64,
     /// Length over which an underlap turns from and into its legs, mm. Default 0.6.
     #[serde(default = "underlap_ramp")]
+    #[schemars(range(min = 0.01, max = 50))]
     pub underlap_ramp_mm: f64,
 }
 

@@ -1,8 +1,17 @@
 //! What a user writes: a typed, checked JSON case.
 
+pub mod check;
+pub mod conform;
+pub mod defaults;
 pub mod domain;
 pub mod effects;
 pub mod fabric;
+pub mod nearest;
+pub mod origin;
+pub mod overrides;
+pub mod parse;
+pub mod read;
+pub mod schema;
 pub mod steps;
 
 use domain::{Domain, Resolution};
@@ -18,6 +27,7 @@ use steps::{Integration, Output, Step};
 #[serde(deny_unknown_fields)]
 pub struct Case {
     /// One line for reports.
+    #[schemars(length(min = 1, max = 200))]
     pub title: String,
     /// The fabric, inline or as the path of a file relative to the case. Needed by every domain but an inline mesh.
     #[serde(default)]
@@ -31,6 +41,7 @@ pub struct Case {
     #[serde(default)]
     pub effects: Effects,
     /// Load steps.
+    #[schemars(length(min = 1, max = 1000))]
     pub steps: Vec<Step>,
     /// Time integration.
     #[serde(default)]

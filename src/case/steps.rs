@@ -8,19 +8,38 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Step {
     /// Nothing changes; the threads' settling damping acts.
-    Settle { time_s: f64 },
+    Settle {
+        /// Duration, s.
+        #[schemars(range(min = 1e-9, max = 10))]
+        time_s: f64,
+    },
     /// The stitch tightens to its thermal strain; contact radii grow to full size over the first half.
-    Pretension { time_s: f64 },
+    Pretension {
+        /// Duration, s.
+        #[schemars(range(min = 1e-9, max = 10))]
+        time_s: f64,
+    },
     /// Nothing changes.
-    Hold { time_s: f64 },
+    Hold {
+        /// Duration, s.
+        #[schemars(range(min = 1e-9, max = 10))]
+        time_s: f64,
+    },
     /// Trellis shear of a periodic cell to `angle_deg`, from the angle before: F̄ = [[cos γ/2, sin γ/2], [sin γ/2, cos γ/2]].
     Shear {
         /// Shear angle at the end, degrees, −80 to 80.
+        #[schemars(range(min = -80, max = 80))]
         angle_deg: f64,
+        /// Duration, s.
+        #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,
     },
     /// The prescribed displacements of the conditions of an inline mesh grow to their full value.
-    Move { time_s: f64 },
+    Move {
+        /// Duration, s.
+        #[schemars(range(min = 1e-9, max = 10))]
+        time_s: f64,
+    },
 }
 
 impl Step {
@@ -52,18 +71,24 @@ impl Step {
 #[serde(deny_unknown_fields, default)]
 pub struct Integration {
     /// Time step: a fixed number of s, or `null` for the estimate times `safety`. Default null.
+    #[schemars(range(min = 1e-12, max = 0.001))]
     pub dt_s: Option<f64>,
     /// Largest time step the estimate may reach, s. Default 5e-7.
+    #[schemars(range(min = 1e-12, max = 0.001))]
     pub dt_max_s: f64,
     /// Factor on the estimated limit, above 0 to 1. Default 0.9.
+    #[schemars(range(min = 0.01, max = 1))]
     pub safety: f64,
     /// `f32` or `f64`. Default f32.
     pub precision: Precision,
     /// Relative error of the energy balance at which the run stops. Default 0.1.
+    #[schemars(range(min = 1e-6, max = 100))]
     pub energy_tolerance: f64,
     /// Penetration at which the run stops, as a share of the thread radius (threads) or yarn thickness (yarns). Default 0.5.
+    #[schemars(range(min = 0.01, max = 100))]
     pub penetration_tolerance: f64,
     /// Offset of one node by so many position quanta (2⁻²³ mm) at the start: measures how far runs scatter by chance. Default 0.
+    #[schemars(range(min = -8_388_608, max = 8_388_608))]
     pub perturbation_quanta: i32,
 }
 
@@ -95,10 +120,13 @@ pub enum Precision {
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
     /// Rows of the tables per load step. Default 200.
+    #[schemars(range(min = 1, max = 1_000_000))]
     pub rows_per_step: usize,
     /// Shear angles at which a frame (VTU) is written, degrees. A frame is also written at the start and at the end of every load step.
+    #[schemars(length(max = 1000), inner(range(min = -80, max = 80)))]
     pub frames_at_deg: Vec<f64>,
     /// Frames per load step besides. Default 0.
+    #[schemars(range(min = 0, max = 10_000))]
     pub frames_per_step: usize,
     /// Whether pictures are rendered of the frames. Default true.
     pub pictures: bool,

@@ -1,0 +1,63 @@
+//! Checks across fields that need no mesh. Ranges of single numbers are in the schema.
+
+mod cell;
+mod inline;
+
+use super::Case;
+use super::domain::Domain;
+use super::origin::Origin;
+use super::steps::Step;
+use crate::error::Result;
+
+/// Most hexahedra of one case.
+pub const MAX_HEXES: f64 = 5e7;
+/// Most beams of one case.
+pub const MAX_BEAMS: f64 = 1e7;
+/// Most time steps of one case.
+pub const MAX_TIME_STEPS: f64 = 1e9;
+/// Positions are held to ± this, mm.
+pub const MAX_POSITION_MM: f64 = 250.0;
+
+/// The first contradiction in a case whose single values are in range. `origin` names files in messages.
+pub fn check(case: &Case, origin: &Origin) -> Result<()> {
+    if case.title.chars().any(char::is_control) {
+        return Err(origin.error("title", "holds a line break or control character, write one line"));
+    }
+    steps(case, origin)?;
+    match &case.domain {
+        Domain::Cell { warps, wefts } => cell::check(case, *warps, *wefts, origin),
+        Domain::Mesh(mesh) => inline::check(case, mesh, origin),
+    }
+}
+
+fn steps(case: &Case, origin: &Origin) -> Result<()> {
+    let mut tightened = None;
+    for (i, step) in case.steps.iter().enumerate() {
+        if let Step::Pretension { .. } = step
+            && let Some(first) = tightened.replace(i)
+        {
+            let message = format!("the stitch is tightened by steps.{first} already, keep one pretension step");
+            return Err(origin.error(&format!("steps.{i}"), message));
+        }
+    }
+    let total: f64 = case.steps.iter().map(Step::time).sum();
+    let (name, dt) = match case.integration.dt_s {
+        Some(dt) => ("dt_s", dt),
+        None => ("dt_max_s", case.integration.dt_max_s),
+    };
+    let path = format!("integration.{name}");
+    if total / dt > MAX_TIME_STEPS {
+        let message = format!(
+            "{dt:e} s makes {:.1e} time steps of the {total} s of all load steps, at most {MAX_TIME_STEPS:e}: \
+             raise it or shorten the steps",
+            total / dt
+        );
+        return Err(origin.error(&path, message));
+    }
+    let shortest = case.steps.iter().map(Step::time).fold(f64::INFINITY, f64::min);
+    if case.integration.dt_s.is_some() && dt > shortest {
+        let message = format!("{dt:e} s is longer than the shortest load step, {shortest:e} s: lower it");
+        return Err(origin.error(&path, message));
+    }
+    Ok(())
+}

@@ -1,0 +1,189 @@
+//! A mesh written out in the case: sizes, shapes, names, and what the conditions catch.
+
+use super::{MAX_BEAMS, MAX_HEXES};
+use crate::case::Case;
+use crate::case::domain::{Condition, InlineBlock, InlineMesh, InlineThread};
+use crate::case::origin::Origin;
+use crate::case::steps::Step;
+use crate::error::Result;
+
+/// Nodes closer than this are the same place, mm. Also the tolerance of condition boxes.
+const TOLERANCE_MM: f64 = 1e-6;
+
+pub fn check(case: &Case, mesh: &InlineMesh, origin: &Origin) -> Result<()> {
+    if case.fabric.is_some() {
+        return Err(
+            origin.error("domain.mesh", "holds its own materials, so that the fabric is not used: remove fabric")
+        );
+    }
+    if mesh.blocks.is_empty() && mesh.threads.is_empty() {
+        return Err(origin.error("domain.mesh", "holds neither blocks nor threads, give at least one"));
+    }
+    names(mesh, origin)?;
+    let hexes: f64 = mesh.blocks.iter().map(|b| b.elements.iter().map(|&n| n as f64).product::<f64>()).sum();
+    if hexes > MAX_HEXES {
+        let message = format!("hold {hexes:.2e} hexahedra, at most {MAX_HEXES:e}: lower elements");
+        return Err(origin.error("domain.mesh.blocks", message));
+    }
+    let beams: f64 = mesh.threads.iter().map(|t| t.nodes.len() as f64 - 1.0).sum();
+    if beams > MAX_BEAMS {
+        return Err(origin.error("domain.mesh.threads", format!("hold {beams:.2e} beams, at most {MAX_BEAMS:e}")));
+    }
+    for (i, body) in mesh.blocks.iter().enumerate() {
+        block(body, &format!("domain.mesh.blocks.{i}"), origin)?;
+    }
+    for (i, body) in mesh.threads.iter().enumerate() {
+        thread(body, &format!("domain.mesh.threads.{i}"), origin)?;
+    }
+    for (i, condition) in mesh.conditions.iter().enumerate() {
+        catches(mesh, condition, &format!("domain.mesh.conditions.{i}"), origin)?;
+    }
+    steps(case, mesh, origin)
+}
+
+fn names(mesh: &InlineMesh, origin: &Origin) -> Result<()> {
+    let blocks = mesh.blocks.iter().enumerate().map(|(i, b)| (format!("domain.mesh.blocks.{i}.name"), &b.name));
+    let threads = mesh.threads.iter().enumerate().map(|(i, t)| (format!("domain.mesh.threads.{i}.name"), &t.name));
+    let mut known = std::collections::BTreeMap::new();
+    for (path, name) in blocks.chain(threads) {
+        if name.chars().any(char::is_control) {
+            return Err(origin.error(&path, "holds a line break or control character, write one line"));
+        }
+        if let Some(first) = known.insert(name, path.clone()) {
+            return Err(origin.error(&path, format!("\"{name}\" is the name of {first} too, give each body its own")));
+        }
+    }
+    Ok(())
+}
+
+fn block(block: &InlineBlock, path: &str, origin: &Origin) -> Result<()> {
+    if block.fibre.iter().map(|c| c * c).sum::<f64>() < 1e-24 {
+        return Err(origin.error(&format!("{path}.fibre"), "has no length, give a direction such as [1, 0, 0]"));
+    }
+    match (&block.corners, &block.nodes) {
+        (Some([low, high]), None) => {
+            for (c, axis) in ["x", "y", "z"].into_iter().enumerate() {
+                if high[c] - low[c] < TOLERANCE_MM {
+                    let message = format!(
+                        "no thickness along {axis}: from {} to {} mm; give the corner with the smaller x, y and z first",
+                        low[c], high[c]
+                    );
+                    return Err(origin.error(&format!("{path}.corners"), message));
+                }
+            }
+            Ok(())
+        }
+        (None, Some(nodes)) => hexes(nodes, block.elements, path, origin),
+        (Some(_), Some(_)) => Err(origin.error(path, "has both corners and nodes, give one of them")),
+        (None, None) => Err(origin.error(path, "has neither corners nor nodes, give one of them")),
+    }
+}
+
+/// Number of nodes, and a positive volume at each corner of each hexahedron.
+fn hexes(nodes: &[[f64; 3]], elements: [usize; 3], path: &str, origin: &Origin) -> Result<()> {
+    let [slices, columns, layers] = elements;
+    let count = elements.iter().map(|n| n + 1).product::<usize>();
+    if nodes.len() != count {
+        let message = format!(
+            "{} nodes, but elements [{slices}, {columns}, {layers}] need ({slices} + 1) × ({columns} + 1) × ({layers} + 1) \
+             = {count}",
+            nodes.len()
+        );
+        return Err(origin.error(&format!("{path}.nodes"), message));
+    }
+    let node = |s: usize, c: usize, l: usize| nodes[(l * (columns + 1) + c) * (slices + 1) + s];
+    for element in 0..slices * columns * layers {
+        let [s, c, l] = [element % slices, element / slices % columns, element / (slices * columns)];
+        for corner in 0..8 {
+            let [i, j, k] = [corner & 1, corner >> 1 & 1, corner >> 2];
+            let along = difference(node(s + 1, c + j, l + k), node(s, c + j, l + k));
+            let across = difference(node(s + i, c + 1, l + k), node(s + i, c, l + k));
+            let up = difference(node(s + i, c + j, l + 1), node(s + i, c + j, l));
+            let volume = triple(along, across, up);
+            if volume <= TOLERANCE_MM.powi(3) {
+                let message = format!(
+                    "the hexahedron of slice {s}, column {c}, layer {l} is inside out or flat (volume {volume:.3e} mm³ at \
+                     a corner): list nodes slices fastest, then columns, then layers, right-handed"
+                );
+                return Err(origin.error(&format!("{path}.nodes"), message));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn thread(thread: &InlineThread, path: &str, origin: &Origin) -> Result<()> {
+    for (i, node) in thread.nodes.iter().enumerate() {
+        if i > 0 && difference(*node, thread.nodes[i - 1]).iter().all(|d| d.abs() < TOLERANCE_MM) {
+            let message = format!("{node:?} repeats the node before it, a beam needs a length: remove one");
+            return Err(origin.error(&format!("{path}.nodes.{i}"), message));
+        }
+    }
+    Ok(())
+}
+
+fn catches(mesh: &InlineMesh, condition: &Condition, path: &str, origin: &Origin) -> Result<()> {
+    let [low, high] = condition.within;
+    if (0..3).any(|c| low[c] > high[c]) {
+        let message = format!("from {low:?} to {high:?} is no box: give the corner with the smaller x, y and z first");
+        return Err(origin.error(&format!("{path}.within"), message));
+    }
+    if condition.components == [false; 3] {
+        let message = "all false: the condition prescribes nothing, set one to true or remove it";
+        return Err(origin.error(&format!("{path}.components"), message));
+    }
+    for (c, on) in condition.components.into_iter().enumerate() {
+        if !on && condition.displacement_mm[c] != 0.0 {
+            let message = format!("{} is not applied, since components.{c} is false", condition.displacement_mm[c]);
+            return Err(origin.error(&format!("{path}.displacement_mm.{c}"), message));
+        }
+    }
+    let chosen = |name: &String| condition.body.as_ref().is_none_or(|body| body == name);
+    let names = || mesh.blocks.iter().map(|b| &b.name).chain(mesh.threads.iter().map(|t| &t.name));
+    if let Some(body) = condition.body.as_ref().filter(|_| !names().any(chosen)) {
+        let message = format!(
+            "no block or thread is named {body:?}; {}",
+            crate::case::nearest::advice(body, names().map(String::as_str))
+        );
+        return Err(origin.error(&format!("{path}.body"), message));
+    }
+    let inside = |x: f64, c: usize| x >= low[c] - TOLERANCE_MM && x <= high[c] + TOLERANCE_MM;
+    let within = |node: &[f64; 3]| (0..3).all(|c| inside(node[c], c));
+    let in_block = mesh.blocks.iter().filter(|b| chosen(&b.name)).any(|block| match (&block.corners, &block.nodes) {
+        (Some([from, to]), _) => (0..3).all(|c| {
+            let n = block.elements[c];
+            (0..=n).any(|i| inside(from[c] + (to[c] - from[c]) * i as f64 / n as f64, c))
+        }),
+        (None, nodes) => nodes.iter().flatten().any(within),
+    });
+    if in_block || mesh.threads.iter().filter(|t| chosen(&t.name)).any(|t| t.nodes.iter().any(within)) {
+        return Ok(());
+    }
+    let message = format!("no node lies in the box from {low:?} to {high:?} mm: widen it (bounds are included)");
+    Err(origin.error(&format!("{path}.within"), message))
+}
+
+fn steps(case: &Case, mesh: &InlineMesh, origin: &Origin) -> Result<()> {
+    for (i, step) in case.steps.iter().enumerate() {
+        let message = match step {
+            Step::Shear { .. } => "shear needs a periodic cell: use domain.cell, or move with conditions",
+            Step::Move { .. } if mesh.conditions.is_empty() => "nothing to move: give domain.mesh.conditions",
+            _ => continue,
+        };
+        return Err(origin.error(&format!("steps.{i}"), message));
+    }
+    let moves = case.steps.iter().any(|step| matches!(step, Step::Move { .. }));
+    if let Some(i) = mesh.conditions.iter().position(|c| !moves && c.displacement_mm != [0.0; 3]) {
+        let path = format!("domain.mesh.conditions.{i}.displacement_mm");
+        return Err(origin.error(&path, "is never applied: add a move step"));
+    }
+    Ok(())
+}
+
+fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn triple(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> f64 {
+    a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+}

@@ -1,0 +1,47 @@
+//! What a user may have meant by a misspelt name.
+
+/// `; did you mean `x`?` when something is close, and the names that are allowed.
+pub fn advice<'a>(name: &str, allowed: impl IntoIterator<Item = &'a str>) -> String {
+    let allowed: Vec<&str> = allowed.into_iter().collect();
+    let near = allowed.iter().map(|a| (distance(name, a), *a)).min().filter(|&(d, a)| {
+        let length = name.chars().count().max(a.len());
+        d <= length.div_ceil(3) || !name.is_empty() && (a.starts_with(name) || name.starts_with(a))
+    });
+    let guess = near.map(|(_, a)| format!("did you mean `{a}`? ")).unwrap_or_default();
+    format!("{guess}allowed: {}", allowed.join(", "))
+}
+
+/// Levenshtein distance of the lower-case names; long names are cut, since no field has more than 40 letters.
+fn distance(a: &str, b: &str) -> usize {
+    let lower = |s: &str| s.chars().take(60).flat_map(char::to_lowercase).collect::<Vec<_>>();
+    let (a, b) = (lower(a), lower(b));
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, cb) in b.iter().enumerate() {
+            let substitute = diagonal + usize::from(ca != cb);
+            diagonal = row[j + 1];
+            row[j + 1] = substitute.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_edits() {
+        assert_eq!(distance("", "abc"), 3);
+        assert_eq!(distance("frction", "friction"), 1);
+        assert_eq!(distance("kitten", "sitting"), 3);
+    }
+
+    #[test]
+    fn guesses_only_what_is_close() {
+        assert!(advice("angle", ["angle_deg", "time_s"]).starts_with("did you mean `angle_deg`?"));
+        assert_eq!(advice("colour", ["angle_deg", "time_s"]), "allowed: angle_deg, time_s");
+    }
+}

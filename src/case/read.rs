@@ -1,0 +1,72 @@
+//! From a case file and the command line to a typed case whose every number has been checked.
+
+use super::check;
+use super::conform::conform;
+use super::defaults;
+use super::fabric::Fabric;
+use super::origin::Origin;
+use super::overrides::Override;
+use super::schema::{self, Shape};
+use super::{Case, FabricSource, parse};
+use crate::error::{Error, Result};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// A case that was read and checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Loaded {
+    /// The case, its fabric inline.
+    pub case: Case,
+    /// The fabric; `None` only for an inline mesh.
+    pub fabric: Option<Fabric>,
+    /// Every default that was used: JSON path and value.
+    pub defaults: Vec<(String, Value)>,
+    /// Where the parts were written; makes errors that name their file.
+    pub origin: Origin,
+}
+
+/// Reads a case file, loads the fabric file it names (relative to the case), applies `path=value` overrides in order,
+/// and checks everything that can be checked without a mesh.
+pub fn read(path: &Path, overrides: &[String]) -> Result<Loaded> {
+    let mut origin = Origin { case: path.into(), ..Origin::default() };
+    let schema = schema::case();
+    let mut value = parse::file(path)?;
+    for text in overrides {
+        let set = Override::read(text)?;
+        if set.path == "fabric" {
+            origin.fabric = None;
+        } else if set.path.starts_with("fabric.") {
+            inline_fabric(&mut value, &mut origin)?;
+        }
+        set.apply(&mut value, &schema)?;
+        origin.overrides.push(set);
+    }
+    inline_fabric(&mut value, &mut origin)?;
+    conform(&value, Shape::new(&schema)).map_err(|fault| origin.error(&fault.path, fault.message))?;
+    let case: Case = serde_path_to_error::deserialize(&value)
+        .map_err(|e| origin.error(&e.path().to_string(), e.inner().to_string()))?;
+    let fabric = match &case.fabric {
+        Some(FabricSource::Inline(fabric)) => Some((**fabric).clone()),
+        _ => None,
+    };
+    check::check(&case, &origin)?;
+    let full = serde_json::to_value(&case).map_err(|e| origin.error("", e.to_string()))?;
+    let defaults = defaults::used(&value, &full);
+    Ok(Loaded { case, fabric, defaults, origin })
+}
+
+/// Replaces the name of a fabric file by its content.
+fn inline_fabric(value: &mut Value, origin: &mut Origin) -> Result<()> {
+    let Some(Value::String(name)) = value.get("fabric") else { return Ok(()) };
+    let file: PathBuf = origin.case.parent().unwrap_or(Path::new("")).join(name);
+    let fabric = parse::file(&file).map_err(|error| match error {
+        Error::File { path, message } => {
+            let message = format!("the fabric file {} cannot be read: {message}", path.display());
+            origin.error("fabric", message)
+        }
+        other => other,
+    })?;
+    value["fabric"] = fabric;
+    origin.fabric = Some(file);
+    Ok(())
+}

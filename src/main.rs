@@ -1,0 +1,221 @@
+//! The command line: arguments in, one library call, text or one line of error out.
+
+use clap::{Parser, Subcommand, ValueEnum};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use tricot::case::read::{Loaded, read};
+use tricot::case::{schema, steps};
+use tricot::error::{Error, Result};
+use tricot::output::directory;
+use tricot::run;
+
+const UNEXPECTED: u8 = 1;
+const BAD_INPUT: u8 = 2;
+const INTERRUPTED: u8 = 130;
+
+/// Explicit finite elements for dry stitched non-crimp fabrics at the scale of their yarns.
+#[derive(Parser)]
+#[command(version, max_term_width = 100, after_help = AFTER)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const AFTER: &str = "\
+Examples:
+  tricot check cases/unit_cell_shear.json
+  tricot run cases/unit_cell_shear.json -o results/cell
+  tricot run cases/unit_cell_shear.json --set steps.2.shear.angle_deg=30 --set fabric.friction=0.3
+  tricot picture results/cell
+  tricot schema > case.schema.json
+
+Exit codes:
+  0    done
+  1    unexpected failure inside tricot
+  2    bad input: command line, case or fabric
+  3    a guard stopped the run; results so far stay on disk
+  4    a file or folder could not be read or written
+  5    this build or machine cannot do it
+  130  interrupted; results so far stay on disk";
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run a case and write its results.
+    Run {
+        #[command(flatten)]
+        case: CaseArguments,
+        /// Folder of the results [default: results/<name of the case>]
+        #[arg(short, long, value_name = "DIR")]
+        output: Option<PathBuf>,
+        /// Scalar type, instead of what the case says
+        #[arg(long)]
+        precision: Option<Scalar>,
+        /// Number of threads [default: all cores]; results do not depend on it
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+        threads: Option<u16>,
+        /// Use a folder that holds results: they are moved to DIR/previous-N
+        #[arg(long)]
+        force: bool,
+        /// No progress bar
+        #[arg(short, long)]
+        quiet: bool,
+    },
+    /// Build the mesh of a case and write it, without running it.
+    Mesh {
+        #[command(flatten)]
+        case: CaseArguments,
+        /// Folder of the mesh [default: results/<name of the case>-mesh]
+        #[arg(short, long, value_name = "DIR")]
+        output: Option<PathBuf>,
+    },
+    /// Check a case without running it.
+    Check {
+        #[command(flatten)]
+        case: CaseArguments,
+        /// Also print the defaults in use and every stage of the algorithm for this case
+        #[arg(long)]
+        explain: bool,
+    },
+    /// Print the JSON Schema of a case: every field, its meaning, unit, range and default.
+    Schema {
+        /// That of a fabric file instead
+        #[arg(long)]
+        fabric: bool,
+    },
+    /// Draw a frame as PNG.
+    Picture {
+        /// Folder of a run (its last frame is drawn), or a frame (.vtu)
+        #[arg(value_name = "DIR_OR_FRAME")]
+        source: PathBuf,
+        /// Field that colours the surface [default: the bodies]
+        #[arg(long)]
+        field: Option<String>,
+        /// Width of the picture in pixels
+        #[arg(long, default_value_t = 1600, value_parser = clap::value_parser!(u16).range(64..=8192))]
+        width: u16,
+        /// The picture [default: picture.png in the folder, or beside the frame under its name]
+        #[arg(short, long, value_name = "FILE")]
+        output: Option<PathBuf>,
+    },
+}
+
+#[derive(clap::Args)]
+struct CaseArguments {
+    /// The case, a JSON file
+    #[arg(value_name = "CASE")]
+    case: PathBuf,
+    /// Change a value of the case or its fabric; may be repeated, e.g. fabric.stitch.thermal_strain=-0.1
+    #[arg(long, value_name = "PATH=VALUE")]
+    set: Vec<String>,
+}
+
+impl CaseArguments {
+    fn read(&self) -> Result<Loaded> {
+        read(&self.case, &self.set)
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Scalar {
+    F32,
+    F64,
+}
+
+impl From<Scalar> for steps::Precision {
+    fn from(scalar: Scalar) -> Self {
+        match scalar {
+            Scalar::F32 => Self::F32,
+            Scalar::F64 => Self::F64,
+        }
+    }
+}
+
+/// What a command leaves for the terminal.
+struct Done {
+    text: String,
+    code: u8,
+}
+
+fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) if !error.use_stderr() => return finish(&error.to_string(), 0),
+        Err(error) => return fail(&usage(&error), BAD_INPUT),
+    };
+    std::panic::set_hook(Box::new(|panic| {
+        _ = fail(&format!("unexpected failure, please report it with the case: {panic}"), UNEXPECTED);
+    }));
+    match std::panic::catch_unwind(|| perform(arguments.command)) {
+        Ok(Ok(Done { text, code })) => finish(&text, code),
+        Ok(Err(error)) => fail(&error.to_string(), error.exit_code()),
+        Err(_) => ExitCode::from(UNEXPECTED),
+    }
+}
+
+fn perform(command: Command) -> Result<Done> {
+    let text = match command {
+        Command::Run { case, output, precision, threads, force, quiet } => {
+            let loaded = case.read()?;
+            let options = run::Options {
+                output: output.unwrap_or_else(|| directory::default(&case.case)),
+                precision: precision.map(Into::into),
+                threads: threads.map(usize::from),
+                force,
+                quiet,
+            };
+            directory::check(&options.output, force)?;
+            let outcome = run::run(&loaded, &options)?;
+            let code = if outcome.interrupted { INTERRUPTED } else { 0 };
+            return Ok(Done { text: outcome.to_string(), code });
+        }
+        Command::Mesh { case, output } => {
+            let dir = output.unwrap_or_else(|| {
+                let mut dir = directory::default(&case.case).into_os_string();
+                dir.push("-mesh");
+                dir.into()
+            });
+            run::mesh(&case.read()?, &dir)?
+        }
+        Command::Check { case, explain } => run::check(&case.read()?, explain)?,
+        Command::Schema { fabric } => schema::text(&if fabric { schema::fabric() } else { schema::case() }),
+        Command::Picture { source, field, width, output } => {
+            let out = output.unwrap_or_else(|| picture_path(&source));
+            run::picture(&source, field.as_deref(), width.into(), &out)?
+        }
+    };
+    Ok(Done { text, code: 0 })
+}
+
+fn picture_path(source: &Path) -> PathBuf {
+    if source.is_dir() { source.join("picture.png") } else { source.with_extension("png") }
+}
+
+/// The first paragraph of a message about the command line, on one line.
+fn usage(error: &clap::Error) -> String {
+    if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        return "no command given (try --help)".into();
+    }
+    let text = error.to_string();
+    let first: Vec<&str> = text.lines().take_while(|l| !l.is_empty()).map(str::trim).collect();
+    format!("{} (try --help)", first.join(" ").trim_start_matches("error: "))
+}
+
+/// Prints to stdout; a reader that has gone away is no failure.
+fn finish(text: &str, code: u8) -> ExitCode {
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            fail(&format!("standard output: {error}"), Error::file("", "").exit_code())
+        }
+        _ => ExitCode::from(code),
+    }
+}
+
+/// Prints one line to stderr.
+fn fail(message: &str, code: u8) -> ExitCode {
+    let line: String = message.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    // Nothing is left to do when even this cannot be written.
+    _ = writeln!(std::io::stderr(), "error: {line}");
+    ExitCode::from(code)
+}

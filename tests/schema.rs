@@ -1,0 +1,126 @@
+//! The schema says of every field what it means and how large it may be, and the shipped cases keep to it.
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use tricot::case::conform::conform;
+use tricot::case::read::read;
+use tricot::case::schema::{self, Shape};
+
+/// Every schema node below `node`, with its path; fields are flagged.
+fn nodes<'a>(node: &'a Value, path: &str, field: bool, found: &mut Vec<(String, &'a Value, bool)>) {
+    found.push((path.into(), node, field));
+    let children = |keyword: &str| node.get(keyword).and_then(Value::as_object).into_iter().flatten();
+    for (name, child) in children("properties") {
+        nodes(child, &format!("{path}.{name}"), true, found);
+    }
+    for (name, child) in children("$defs") {
+        nodes(child, name, false, found);
+    }
+    for keyword in ["oneOf", "anyOf"] {
+        for child in node.get(keyword).and_then(Value::as_array).into_iter().flatten() {
+            nodes(child, path, false, found);
+        }
+    }
+    if let Some(child) = node.get("items") {
+        nodes(child, &format!("{path}[]"), false, found);
+    }
+}
+
+fn is_number(node: &Value) -> bool {
+    let names = |n: &Value| ["number", "integer"].iter().any(|t| n == t);
+    node.get("type").is_some_and(|t| names(t) || t.as_array().is_some_and(|a| a.iter().any(names)))
+}
+
+#[test]
+fn every_field_is_described_and_every_number_has_a_range() {
+    for schema in [schema::case(), schema::fabric()] {
+        let mut found = vec![];
+        nodes(&schema, "", false, &mut found);
+        assert!(found.len() > 40);
+        for (path, node, field) in found {
+            // The one field of a variant: what it means stands with the variant.
+            let tag = node.get("type").is_some_and(|t| t == "object") || node.get("$ref").is_some();
+            assert!(!field || tag || node.get("description").is_some(), "{path} has no description");
+            if is_number(node) {
+                let limit = |keyword| node.get(keyword).and_then(Value::as_f64);
+                let (low, high) = (limit("minimum"), limit("maximum"));
+                assert!(low.is_some() && low < high, "{path}: {low:?} to {high:?}");
+            }
+            let closed = node.get("additionalProperties") == Some(&Value::Bool(false));
+            assert!(node.get("properties").is_none() || closed, "{path} accepts unknown fields");
+        }
+    }
+}
+
+/// The checks read these keywords; another one would be in the schema and not be checked.
+#[test]
+fn the_schema_uses_only_keywords_that_are_checked() {
+    let known = [
+        "$schema",
+        "$defs",
+        "$ref",
+        "title",
+        "description",
+        "default",
+        "format",
+        "type",
+        "properties",
+        "required",
+        "additionalProperties",
+        "items",
+        "minItems",
+        "maxItems",
+        "minLength",
+        "maxLength",
+        "minimum",
+        "maximum",
+        "enum",
+        "const",
+        "oneOf",
+        "anyOf",
+    ];
+    for schema in [schema::case(), schema::fabric()] {
+        let mut found = vec![];
+        nodes(&schema, "", false, &mut found);
+        for (path, node, _) in found {
+            for keyword in node.as_object().unwrap().keys() {
+                assert!(known.contains(&keyword.as_str()), "{path}: {keyword}");
+            }
+        }
+    }
+}
+
+fn json_files(dir: &str) -> Vec<std::path::PathBuf> {
+    let mut files: Vec<_> = fs::read_dir(dir).unwrap().map(|e| e.unwrap().path()).collect();
+    files.retain(|path| path.extension().is_some_and(|e| e == "json"));
+    assert!(!files.is_empty());
+    files
+}
+
+#[test]
+fn shipped_cases_and_fabrics_are_valid() {
+    for path in json_files("cases") {
+        let loaded = read(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(loaded.origin.case, path);
+        let value: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        conform(&value, Shape::new(&schema::case())).unwrap();
+    }
+    for path in json_files("cases/fabrics") {
+        let value: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        conform(&value, Shape::new(&schema::fabric())).unwrap();
+    }
+}
+
+/// The defaults that the schema shows are those that a case gets.
+#[test]
+fn defaults_are_in_the_schema_and_in_range() {
+    let loaded = read(Path::new("cases/unit_cell_shear.json"), &[]).unwrap();
+    let full = serde_json::to_value(&loaded.case).unwrap();
+    let schema = schema::case();
+    conform(&full, Shape::new(&schema)).unwrap();
+    for name in ["resolution", "effects", "integration", "output"] {
+        assert_eq!(schema["properties"][name]["default"], full[name], "{name}");
+        assert!(loaded.defaults.iter().any(|(path, _)| path.starts_with(&format!("{name}."))));
+    }
+}
