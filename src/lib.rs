@@ -2,4 +2,5 @@
 
 pub mod case;
 pub mod error;
+pub mod fabric;
 pub mod mesh;
