@@ -57,6 +57,7 @@ pub struct Contact {
     #[schemars(range(min = 1e-6, max = 1e9))]
     pub yarn_penalty_n_mm3: f64,
     /// Penalty of a pair of beams, N/mm. Default 30.
+    #[schemars(range(min = 1e-6, max = 1e9))]
     pub thread_thread_penalty_n_mm: f64,
     /// Coulomb friction with true stick. The coefficient belongs to the fabric. Default true.
     pub friction: bool,

@@ -3,7 +3,14 @@
 
 use crate::case::fabric::Material;
 
+pub mod clearance;
+pub mod export;
 pub mod frame;
+pub mod linking;
+pub mod quality;
+pub mod report;
+pub mod surface;
+pub mod vector;
 
 /// Everything that is discretised, in its reference position. Lengths in mm.
 #[derive(Debug, Clone, Default)]

@@ -1,0 +1,63 @@
+//! From the parameters of a case to a mesh.
+
+pub mod cell;
+pub mod inline;
+pub mod polyline;
+pub mod section;
+pub mod stitch;
+
+use crate::case::Case;
+use crate::case::domain::Domain;
+use crate::case::fabric::Fabric;
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+
+/// Positions are kept in whole quanta of 2⁻²³ mm, which reach ±256 mm.
+const QUANTA_PER_MM: f64 = 8_388_608.0;
+/// Largest coordinate, mm: leaves room for displacements.
+const REACH: f64 = 250.0;
+/// Largest number of nodes.
+const MOST_NODES: f64 = 1e8;
+
+/// Builds the mesh of a case. `fabric` is the case's fabric, read from its file where it has one.
+pub fn build(case: &Case, fabric: Option<&Fabric>) -> Result<Mesh> {
+    let mesh = match &case.domain {
+        Domain::Cell { warps, wefts } => {
+            let fabric =
+                fabric.ok_or_else(|| Error::case("fabric", "a cell needs a fabric: its path, or the fabric"))?;
+            cell::build(case, fabric, *warps, *wefts)?
+        }
+        Domain::Mesh(inline) => inline::build(inline)?,
+    };
+    for (node, position) in mesh.nodes.iter().enumerate() {
+        if position.iter().any(|x| x.abs() > REACH) {
+            return Err(Error::geometry(
+                "domain",
+                format!(
+                    "node {node} lies at {position:?} mm, but coordinates must stay within ±{REACH} mm; make the domain smaller or move it towards the origin"
+                ),
+            ));
+        }
+    }
+    Ok(mesh)
+}
+
+/// The nearest length that is a whole number of position quanta, mm.
+fn quantised(x: f64) -> f64 {
+    (x * QUANTA_PER_MM).round() / QUANTA_PER_MM
+}
+
+/// Refuses a value at a JSON path unless it holds a condition.
+fn require(holds: bool, place: &str, message: impl FnOnce() -> String) -> Result<()> {
+    if holds { Ok(()) } else { Err(Error::case(place, message())) }
+}
+
+/// Refuses a number that is not finite and above zero.
+fn positive(value: f64, place: &str) -> Result<()> {
+    require(value.is_finite() && value > 0.0, place, || format!("is {value}, but must be above 0"))
+}
+
+/// Refuses a number that is not finite and at least zero.
+fn not_negative(value: f64, place: &str) -> Result<()> {
+    require(value.is_finite() && value >= 0.0, place, || format!("is {value}, but must be at least 0"))
+}

@@ -1,0 +1,148 @@
+//! Whether the loops of the stitch hold each other: Gauss linking numbers of loop heads with the legs of the next loop of
+//! their wale.
+
+use super::vector::{Vector, add, cross, dot, norm, sub};
+use super::{Mesh, Part};
+use std::f64::consts::PI;
+
+/// How the head of one loop links with the next loop of its wale.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Link {
+    /// Thread of the head.
+    pub head: String,
+    /// Thread of the legs.
+    pub legs: String,
+    /// Linking numbers of the head, closed across its own legs, with the entry and exit leg, each closed far away.
+    pub numbers: [f64; 2],
+    /// Linking number of the head with the whole next loop: 0, since the stitch is a chain of slip knots.
+    pub whole: f64,
+}
+
+impl Link {
+    /// Whether both legs pass through the head, in opposite directions.
+    pub fn holds(&self) -> bool {
+        let [entry, exit] = self.numbers.map(|x| x.round() as i64);
+        entry.abs() == 1 && exit == -entry && self.whole.round() == 0.0
+    }
+}
+
+/// A loop of a periodic cell: its nodes, from the top of the entry leg to the top of the exit leg.
+struct Loop {
+    thread: usize,
+    nodes: Vec<Vector>,
+    /// Node furthest along y.
+    apex: usize,
+    /// Middle between the tops of its legs.
+    base: Vector,
+}
+
+/// One entry per loop of a periodic cell.
+pub fn links(mesh: &Mesh) -> Vec<Link> {
+    let Some([lx, ly]) = mesh.period else { return Vec::new() };
+    let loops = loops(mesh);
+    let name = |l: &Loop| mesh.threads[l.thread].name.clone();
+    let mut links = Vec::new();
+    for head in &loops {
+        // The next loop of the wale is the one whose legs start nearest to the apex, in the image where they do.
+        let apex = head.nodes[head.apex];
+        let image = |l: &Loop| {
+            let cells = [(apex[0] - l.base[0]) / lx, (apex[1] - l.base[1]) / ly];
+            [cells[0].round() * lx, cells[1].round() * ly, 0.0]
+        };
+        let away = |l: &Loop| {
+            let d = sub(apex, add(l.base, image(l)));
+            libm::hypot(d[0], d[1])
+        };
+        let Some(next) = loops.iter().min_by(|a, b| away(a).total_cmp(&away(b))) else { continue };
+        let level = 0.5 * (head.base[1] + apex[1]);
+        let closed: Vec<Vector> = head.nodes.iter().copied().filter(|p| p[1] > level).collect();
+        let legs: Vec<Vector> = next.nodes.iter().map(|&p| add(p, image(next))).collect();
+        let far = 10.0 * (lx + ly);
+        let leg = |nodes: &[Vector]| linking(&closed, &detour(nodes, far));
+        let exit: Vec<Vector> = legs[next.apex..].iter().rev().copied().collect();
+        // The exit leg is walked backwards so that both start at the warp; along the thread it counts the other way.
+        let numbers = [leg(&legs[..=next.apex]), -leg(&exit)];
+        links.push(Link { head: name(head), legs: name(next), numbers, whole: linking(&closed, &legs) });
+    }
+    links
+}
+
+fn loops(mesh: &Mesh) -> Vec<Loop> {
+    let mut loops = Vec::new();
+    for (index, thread) in mesh.threads.iter().enumerate() {
+        let beams = thread.beams();
+        let starts = (0..beams)
+            .filter(|&i| thread.parts[i] == Part::Loop && thread.parts[(i + beams - 1) % beams] == Part::Underlap);
+        for start in starts {
+            let mut nodes = Vec::new();
+            let mut beam = start;
+            while beam < beams && thread.parts[beam] == Part::Loop {
+                nodes.push(mesh.position(thread.beam(beam)[0]));
+                beam += 1;
+            }
+            nodes.push(mesh.position(thread.beam(beam - 1)[1]));
+            let apex = (0..nodes.len()).fold(0, |best, i| if nodes[i][1] > nodes[best][1] { i } else { best });
+            let [a, b] = [nodes[0], nodes[nodes.len() - 1]];
+            let base = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])];
+            loops.push(Loop { thread: index, nodes, apex, base });
+        }
+    }
+    loops
+}
+
+/// Closes an open leg by a way around the fabric: down from its end, along y, up and back to its start.
+fn detour(leg: &[Vector], far: f64) -> Vec<Vector> {
+    let [start, end] = [leg[0], leg[leg.len() - 1]];
+    let mut closed = leg.to_vec();
+    closed.extend([
+        [end[0], end[1], -far],
+        [end[0], end[1] + far, -far],
+        [start[0], end[1] + far, far],
+        [start[0], start[1], far],
+    ]);
+    closed
+}
+
+/// Linking number of two closed polygons: the signed solid angles under which the segments of one see those of the
+/// other, added up and divided by 4π. Exact up to rounding.
+pub fn linking(a: &[Vector], b: &[Vector]) -> f64 {
+    let mut total = 0.0;
+    for (i, &p) in a.iter().enumerate() {
+        let q = a[(i + 1) % a.len()];
+        for (j, &r) in b.iter().enumerate() {
+            let s = b[(j + 1) % b.len()];
+            // The differences of points on both segments span a parallelogram: two triangles seen from the origin.
+            let corners = [sub(r, p), sub(s, p), sub(s, q), sub(r, q)];
+            total += solid_angle(corners[0], corners[1], corners[2]) + solid_angle(corners[0], corners[2], corners[3]);
+        }
+    }
+    total / (4.0 * PI)
+}
+
+/// Signed solid angle of a triangle seen from the origin (van Oosterom and Strackee, 1983).
+fn solid_angle(a: Vector, b: Vector, c: Vector) -> f64 {
+    let [la, lb, lc] = [norm(a), norm(b), norm(c)];
+    let volume = dot(a, cross(b, c));
+    2.0 * libm::atan2(volume, la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square(centre: Vector, upright: bool) -> Vec<Vector> {
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+            .map(|[s, t]| add(centre, if upright { [s, 0.0, t] } else { [s, t, 0.0] }))
+            .to_vec()
+    }
+
+    #[test]
+    fn linked_squares_count_one_and_separate_ones_none() {
+        let flat = square([0.0; 3], false);
+        assert!((linking(&flat, &square([1.0, 0.2, 0.1], true)).abs() - 1.0).abs() < 1e-12);
+        assert!(linking(&flat, &square([3.0, 0.2, 0.1], true)).abs() < 1e-12);
+        let reversed: Vec<Vector> = flat.iter().rev().copied().collect();
+        let other = square([1.0, 0.2, 0.1], true);
+        assert!((linking(&flat, &other) + linking(&reversed, &other)).abs() < 1e-12);
+    }
+}
