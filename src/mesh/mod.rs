@@ -4,6 +4,8 @@
 use crate::case::fabric::Material;
 
 pub mod frame;
+#[cfg(test)]
+pub(crate) mod sample;
 
 /// Everything that is discretised, in its reference position. Lengths in mm.
 #[derive(Debug, Clone, Default)]
