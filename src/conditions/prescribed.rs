@@ -36,7 +36,8 @@ impl Kernel for Prescribed {
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { first_thread } = io.params();
-        let (nodes, targets, velocity, mass) = (io.uints(NODES), io.scalars(TARGETS), io.scalars(VELOCITY), io.scalars(MASS));
+        let (nodes, targets, velocity, mass) =
+            (io.uints(NODES), io.scalars(TARGETS), io.scalars(VELOCITY), io.scalars(MASS));
         let plane = mass.len();
         let mut acceleration = io.scatter::<L::Scalar>(ACCELERATION);
         let mut inverse = io.scatter::<L::Scalar>(INVERSE_MASS);

@@ -114,7 +114,8 @@ impl Kernel for Candidates {
                         let corners = [here.0, here.1, next.1, next.0];
                         here = next;
                         let (d1, d2) = (sub(corners[2], corners[0]), sub(corners[3], corners[1]));
-                        let middle = scale(add(add(corners[0], corners[1]), add(corners[2], corners[3])), constant(0.25));
+                        let middle =
+                            scale(add(add(corners[0], corners[1]), add(corners[2], corners[3])), constant(0.25));
                         let spread = constant(0.5) * norm(d1).max(norm(d2));
                         if norm(middle) > reach + spread * constant(1.1) {
                             continue;

@@ -126,7 +126,12 @@ fn patch<R: Real>(q: &[Vector<R>; 4]) -> [Vector<R>; 4] {
     let quarter = R::from_f64(0.25);
     let (s01, s23) = (add(q[0], q[1]), add(q[2], q[3]));
     let (d01, d32) = (sub(q[1], q[0]), sub(q[2], q[3]));
-    [scale(add(s01, s23), quarter), scale(add(d01, d32), quarter), scale(sub(s23, s01), quarter), scale(sub(d32, d01), quarter)]
+    [
+        scale(add(s01, s23), quarter),
+        scale(add(d01, d32), quarter),
+        scale(sub(s23, s01), quarter),
+        scale(sub(d32, d01), quarter),
+    ]
 }
 
 /// Point of a patch.
@@ -206,7 +211,11 @@ impl<R: Real> Closest<R> {
         }
         let tiny = self.distance < R::from_f64(1e-6);
         if height >= zero {
-            return Some(if tiny { (self.normal, height) } else { (scale(self.offset, R::from_f64(1.0) / self.distance), self.distance) });
+            return Some(if tiny {
+                (self.normal, height)
+            } else {
+                (scale(self.offset, R::from_f64(1.0) / self.distance), self.distance)
+            });
         }
         (-height > R::from_f64(0.7) * self.distance).then_some((self.normal, -self.distance))
     }

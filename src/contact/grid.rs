@@ -80,7 +80,11 @@ pub fn cells<R: Real>(params: &Params, axis: usize, low: R, high: R) -> (i32, i3
         libm::floor(x.clamp(-1e6, 1e6)) as i32
     };
     let (low, high, count) = (cell(low), cell(high), params.cells[axis] as i32);
-    if params.period[axis] != 0 { (low, high.min(low + count - 1)) } else { (low.clamp(0, count - 1), high.clamp(0, count - 1)) }
+    if params.period[axis] != 0 {
+        (low, high.min(low + count - 1))
+    } else {
+        (low.clamp(0, count - 1), high.clamp(0, count - 1))
+    }
 }
 
 /// Number of a cell.

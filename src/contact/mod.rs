@@ -149,12 +149,7 @@ pub fn add_pair<R: Real, const N: usize, const M: usize>(
 
 /// Adds stiffness to nodes by weights.
 #[inline(always)]
-pub fn add_stiffness<R: Real>(
-    to: &[AtomicI32],
-    stiffness: R,
-    quantum: R,
-    nodes: impl IntoIterator<Item = (usize, R)>,
-) {
+pub fn add_stiffness<R: Real>(to: &[AtomicI32], stiffness: R, quantum: R, nodes: impl IntoIterator<Item = (usize, R)>) {
     let quanta = stiffness / quantum;
     for (node, weight) in nodes {
         to[node].fetch_add((quanta * weight.abs()).to_i32(), Ordering::Relaxed);

@@ -102,8 +102,7 @@ impl Kernel for Penalty {
                     gap < zero && -*distance < real(params.depth)
                 });
                 let Some((normal, distance)) = touch else {
-                    sum[SUM_FRICTION] =
-                        sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
+                    sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
                     state.fill(zero);
                     continue;
                 };
@@ -134,8 +133,8 @@ impl Kernel for Penalty {
                 sum[SUM_SLIP] = sum[SUM_SLIP] + slid.slip;
                 state[..3].copy_from_slice(&slid.elastic);
                 state[3] = normal_force;
-                energy = energy
-                    + constant(0.5) * (elastic_force * depth + tangential * dot(slid.elastic, slid.elastic));
+                energy =
+                    energy + constant(0.5) * (elastic_force * depth + tangential * dot(slid.elastic, slid.elastic));
                 let force = sub(scale(normal, normal_force), scale(slid.elastic, tangential));
                 for i in 0..3 {
                     for j in 0..3 {

@@ -265,8 +265,8 @@ impl Kernel for Force {
                 sum[SUM_SLIP] = sum[SUM_SLIP] + slid.slip;
                 state[..3].copy_from_slice(&slid.elastic);
                 state[3] = normal_force;
-                energy = energy
-                    + constant(0.5) * (elastic_force * depth + tangential * dot(slid.elastic, slid.elastic));
+                energy =
+                    energy + constant(0.5) * (elastic_force * depth + tangential * dot(slid.elastic, slid.elastic));
                 let force = sub(scale(normal, normal_force), scale(slid.elastic, tangential));
                 for i in 0..3 {
                     for j in 0..3 {

@@ -103,7 +103,8 @@ fn place(station: usize, row: usize) -> usize {
 #[inline(always)]
 fn gather<L: Lane>(io: &Io<L::Scalar>, group: &Group, scratch: &mut [L::Scalar]) {
     let (reference, quanta, remainder) = (io.ints(REFERENCE), io.ints(QUANTA), io.scalars(REMAINDER));
-    let (acceleration, inverse, stiffness) = (io.scalars(ACCELERATION), io.scalars(INVERSE_MASS), io.scalars(STIFFNESS));
+    let (acceleration, inverse, stiffness) =
+        (io.scalars(ACCELERATION), io.scalars(INVERSE_MASS), io.scalars(STIFFNESS));
     let plane = inverse.len();
     let n = group.stations as usize;
     let g = &io.row.gradient;
@@ -120,7 +121,8 @@ fn gather<L: Lane>(io: &Io<L::Scalar>, group: &Group, scratch: &mut [L::Scalar])
             });
             for k in 0..3 {
                 let (a, b) = (next + k * plane, here + k * plane);
-                let w = L::Scalar::from_i32(quanta[a].wrapping_sub(quanta[b])) * quantum + (remainder[a] - remainder[b]);
+                let w =
+                    L::Scalar::from_i32(quanta[a].wrapping_sub(quanta[b])) * quantum + (remainder[a] - remainder[b]);
                 let affine = g[k][0] * rest[0] + g[k][1] * rest[1] + g[k][2] * rest[2];
                 scratch[place(i, DIRECTION + k) + lane] = rest[k] + affine + w;
                 scratch[place(i, RESPONSE + k) + lane] = acceleration[b];
@@ -163,7 +165,8 @@ fn solve<L: Lane>(io: &Io<L::Scalar>, group: &Group, s: &mut Sweep<L::Scalar>) {
     let Params { beta } = io.params();
     let n = group.stations as usize;
     let (zero, one) = (L::new(0.0), L::new(1.0));
-    let compliance = L::splat(L::Scalar::from_f64(1.0) / (L::Scalar::from_f64(f64::from(beta)) * io.row.dt * io.row.dt));
+    let compliance =
+        L::splat(L::Scalar::from_f64(1.0) / (L::Scalar::from_f64(f64::from(beta)) * io.row.dt * io.row.dt));
     for i in 0..n {
         let next = (i + 1) % n;
         let v: [L; 3] = s.vector(i, DIRECTION);

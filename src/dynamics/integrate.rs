@@ -91,7 +91,8 @@ impl<const LINES: bool, const GRAVITY: bool> Kernel for Integrate<LINES, GRAVITY
                 damped = damped + mass * damping * mean * mean * row.dt_mid;
                 inertia = inertia + virtual_force * mean * row.dt_mid;
                 if GRAVITY {
-                    fallen = fallen + (mass + extra) * L::Scalar::from_f64(f64::from(params.gravity[k])) * mean * row.dt_mid;
+                    fallen =
+                        fallen + (mass + extra) * L::Scalar::from_f64(f64::from(params.gravity[k])) * mean * row.dt_mid;
                 }
                 let (q, r) = (quanta.at(k, node), remainder.at(k, node));
                 (*q, *r) = carry(*q, *r + new * row.dt);

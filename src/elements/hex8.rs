@@ -159,9 +159,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
         }
         let q: Tensor<L> = std::array::from_fn(|i| std::array::from_fn(|j| L::splat(frame[i][j])));
         std::array::from_fn(|j| {
-            std::array::from_fn(|a| {
-                q[2][j].fma(global[2][a], q[1][j].fma(global[1][a], q[0][j] * global[0][a]))
-            })
+            std::array::from_fn(|a| q[2][j].fma(global[2][a], q[1][j].fma(global[1][a], q[0][j] * global[0][a])))
         })
     }
 
@@ -172,10 +170,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
         let inverse: Tensor<L> = std::array::from_fn(|k| std::array::from_fn(|j| self.shape(point, 3 * k + j)));
         std::array::from_fn(|i| {
             std::array::from_fn(|j| {
-                d[i][2][at[2]].fma(
-                    inverse[2][j],
-                    d[i][1][at[1]].fma(inverse[1][j], d[i][0][at[0]] * inverse[0][j]),
-                )
+                d[i][2][at[2]].fma(inverse[2][j], d[i][1][at[1]].fma(inverse[1][j], d[i][0][at[0]] * inverse[0][j]))
             })
         })
     }
@@ -197,7 +192,12 @@ fn derivatives<L: Lane>(u: &[L; 8]) -> [[L; 4]; 3] {
     let (near, far) = (L::new(NEAR), L::new(FAR));
     EDGES.map(|(low, step)| {
         let d = low.map(|a| u[a + step] - u[a]);
-        let first = [near.fma(d[0], far * d[1]), far.fma(d[0], near * d[1]), near.fma(d[2], far * d[3]), far.fma(d[2], near * d[3])];
+        let first = [
+            near.fma(d[0], far * d[1]),
+            far.fma(d[0], near * d[1]),
+            near.fma(d[2], far * d[3]),
+            far.fma(d[2], near * d[3]),
+        ];
         [
             near.fma(first[0], far * first[2]),
             near.fma(first[1], far * first[3]),
@@ -236,7 +236,8 @@ fn corner_forces<L: Lane>(g: &[[L; 4]; 3]) -> [L; 8] {
 /// Qᵀ A Q.
 #[inline(always)]
 fn into_frame<R: Real>(q: &Tensor<R>, a: &Tensor<R>) -> Tensor<R> {
-    let aq: Tensor<R> = std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * q[0][j] + a[i][1] * q[1][j] + a[i][2] * q[2][j]));
+    let aq: Tensor<R> =
+        std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * q[0][j] + a[i][1] * q[1][j] + a[i][2] * q[2][j]));
     std::array::from_fn(|i| std::array::from_fn(|j| q[0][i] * aq[0][j] + q[1][i] * aq[1][j] + q[2][i] * aq[2][j]))
 }
 
@@ -292,7 +293,8 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
                 let out = slots.item(0, item);
                 for (corner, &binary) in BINARY.iter().enumerate() {
                     for i in 0..3 {
-                        let f = q[i][2].fma(local[2][binary], q[i][1].fma(local[1][binary], q[i][0] * local[0][binary]));
+                        let f =
+                            q[i][2].fma(local[2][binary], q[i][1].fma(local[1][binary], q[i][0] * local[0][binary]));
                         f.store(&mut out[(3 * corner + i) * LANES + lane..]);
                     }
                 }

@@ -277,12 +277,40 @@ const SQRT_HALF_F32: u32 = std::f32::consts::FRAC_1_SQRT_2.to_bits();
 const SQRT_HALF_F64: u64 = std::f64::consts::FRAC_1_SQRT_2.to_bits();
 
 register!(
-    F32, f32, f32s, m32s, F32_LANES, splat_f32s, add_f32s, sub_f32s, mul_f32s, div_f32s, neg_f32s, mul_add_f32s,
-    sqrt_f32s, abs_f32s, less_than_f32s, select_f32s
+    F32,
+    f32,
+    f32s,
+    m32s,
+    F32_LANES,
+    splat_f32s,
+    add_f32s,
+    sub_f32s,
+    mul_f32s,
+    div_f32s,
+    neg_f32s,
+    mul_add_f32s,
+    sqrt_f32s,
+    abs_f32s,
+    less_than_f32s,
+    select_f32s
 );
 register!(
-    F64, f64, f64s, m64s, F64_LANES, splat_f64s, add_f64s, sub_f64s, mul_f64s, div_f64s, neg_f64s, mul_add_f64s,
-    sqrt_f64s, abs_f64s, less_than_f64s, select_f64s
+    F64,
+    f64,
+    f64s,
+    m64s,
+    F64_LANES,
+    splat_f64s,
+    add_f64s,
+    sub_f64s,
+    mul_f64s,
+    div_f64s,
+    neg_f64s,
+    mul_add_f64s,
+    sqrt_f64s,
+    abs_f64s,
+    less_than_f64s,
+    select_f64s
 );
 
 macro_rules! scalar {

@@ -79,10 +79,7 @@ mod tests {
     use super::*;
 
     fn worst<R: Real>(points: impl Iterator<Item = f64>, f: impl Fn(R) -> R, exact: impl Fn(f64) -> f64) -> f64 {
-        points
-            .map(|x| R::from_f64(x))
-            .map(|x| (f(x).to_f64() / exact(x.to_f64()) - 1.0).abs())
-            .fold(0.0, f64::max)
+        points.map(|x| R::from_f64(x)).map(|x| (f(x).to_f64() / exact(x.to_f64()) - 1.0).abs()).fold(0.0, f64::max)
     }
 
     fn powers() -> impl Iterator<Item = f64> {

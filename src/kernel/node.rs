@@ -72,7 +72,8 @@ impl<'a> Lattice<'a> {
     pub fn between<R: Real>(&self, a: usize, b: usize, shift: [i32; 2]) -> Vector<R> {
         let shift = [shift[0], shift[1], 0];
         [0, 1, 2].map(|k| {
-            let d = self.quanta[a + k * self.plane].wrapping_sub(self.quanta[b + k * self.plane]).wrapping_add(shift[k]);
+            let d =
+                self.quanta[a + k * self.plane].wrapping_sub(self.quanta[b + k * self.plane]).wrapping_add(shift[k]);
             R::from_i32(d) * R::from_f64(super::position::QUANTUM)
         })
     }

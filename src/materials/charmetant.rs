@@ -38,8 +38,11 @@ const CRUSHED: f64 = 1e-4;
 
 /// Row of the material table. MPa, MPa, –, MPa, MPa, –.
 pub fn parameters(k_elong: f64, k_comp: f64, p: f64, k_dist: f64, k_sh: f64, cap: f64) -> [f64; PARAMETERS] {
-    let (slope, energy) =
-        if cap > 0.0 { (k_comp * p * libm::pow(cap, p - 2.0), k_comp * libm::pow(cap, p) * (0.5 * p - 1.0)) } else { (0.0, 0.0) };
+    let (slope, energy) = if cap > 0.0 {
+        (k_comp * p * libm::pow(cap, p - 2.0), k_comp * libm::pow(cap, p) * (0.5 * p - 1.0))
+    } else {
+        (0.0, 0.0)
+    };
     [k_elong, k_comp, p, k_dist, k_sh, cap, slope, energy]
 }
 
@@ -86,19 +89,7 @@ fn state<L: Lane>(h: &Tensor<L>) -> State<L> {
     let inv_det = one / det;
     let dv = half * (b22 - b33);
     let u = dv.fma(dv, b23 * b23) * inv_det;
-    State {
-        g2,
-        g3,
-        inv_c,
-        b22,
-        b33,
-        b23,
-        inv_det,
-        i_elong: half * log1p(t11),
-        i_comp: L::new(0.25) * log1p(dm),
-        dv,
-        u,
-    }
+    State { g2, g3, inv_c, b22, b33, b23, inv_det, i_elong: half * log1p(t11), i_comp: L::new(0.25) * log1p(dm), dv, u }
 }
 
 /// |I_comp|^(p − 1), and |I_comp| kept from zero.
@@ -134,9 +125,7 @@ impl Material for Charmetant {
         let s11 = s.inv_c * (p[K_ELONG].fma(s.i_elong, two * (g_tg * s.inv_c - k_sh * g_g)));
         let pk2 = [[s11, s12, s13], [s12, two * t22, two * t23], [s13, two * t23, two * t33]];
         std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                h[i][2].fma(pk2[2][j], h[i][1].fma(pk2[1][j], h[i][0].fma(pk2[0][j], pk2[i][j])))
-            })
+            std::array::from_fn(|j| h[i][2].fma(pk2[2][j], h[i][1].fma(pk2[1][j], h[i][0].fma(pk2[0][j], pk2[i][j]))))
         })
     }
 

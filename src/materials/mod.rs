@@ -38,9 +38,11 @@ pub fn choose(choice: &Choice) -> (Law, [f64; PARAMETERS], f64) {
             charmetant::parameters(k_elong_mpa, k_comp_mpa, p_comp, k_dist_mpa, k_sh_mpa, compaction_cap),
             k_elong_mpa,
         ),
-        Choice::NeoHookean { young_mpa, poisson } => {
-            (Law::NeoHookean, neo_hookean::parameters(young_mpa, poisson), neo_hookean::longitudinal(young_mpa, poisson))
-        }
+        Choice::NeoHookean { young_mpa, poisson } => (
+            Law::NeoHookean,
+            neo_hookean::parameters(young_mpa, poisson),
+            neo_hookean::longitudinal(young_mpa, poisson),
+        ),
     }
 }
 

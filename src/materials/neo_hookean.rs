@@ -30,7 +30,8 @@ impl Material for NeoHookean {
     #[inline(always)]
     fn stress<L: Lane>(p: &[L; PARAMETERS], h: &Tensor<L>) -> Tensor<L> {
         let one = L::new(1.0);
-        let f: Tensor<L> = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { one + h[i][j] } else { h[i][j] }));
+        let f: Tensor<L> =
+            std::array::from_fn(|i| std::array::from_fn(|j| if i == j { one + h[i][j] } else { h[i][j] }));
         let j = jacobian(h).max(L::new(CRUSHED));
         let log = ln(j);
         let k = (p[LAMBDA] * log - p[MU]) / j;

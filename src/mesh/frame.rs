@@ -1,5 +1,8 @@
 //! The deformed state of a mesh at one moment: what measures, files and pictures are made from.
 
+use super::{Mesh, Seen};
+use crate::error::{Error, Result};
+
 /// A deformed state. Fields are named with their unit, as ParaView shows them.
 #[derive(Debug, Clone, Default)]
 pub struct Frame {
@@ -34,5 +37,35 @@ impl Frame {
         let [x, y] = [f64::from(image[0]) * period[0], f64::from(image[1]) * period[1]];
         let [[a, b], [c, d]] = self.gradient;
         [a * x + b * y, c * x + d * y, 0.0]
+    }
+
+    /// Current position of a node in an image, mm.
+    pub fn position(&self, mesh: &Mesh, seen: Seen) -> [f64; 3] {
+        let [x, y, z] = self.positions[seen.node];
+        let [dx, dy, dz] = self.shift(mesh.period.unwrap_or_default(), seen.image);
+        [x + dx, y + dy, z + dz]
+    }
+
+    /// Whether positions and fields have as many values as the mesh has items; the error names the first that has not.
+    pub fn check(&self, mesh: &Mesh) -> Result<()> {
+        let sized = |name: &str, count: usize, wanted: usize| {
+            if count == wanted {
+                return Ok(());
+            }
+            Err(Error::geometry(format!("frame, {name}"), format!("{count} values where the mesh needs {wanted}")))
+        };
+        sized("positions", self.positions.len(), mesh.nodes.len())?;
+        for (fields, items) in
+            [(&self.node_fields, mesh.nodes.len()), (&self.hex_fields, mesh.hexes()), (&self.beam_fields, mesh.beams())]
+        {
+            for field in fields {
+                if field.components != 1 && field.components != 3 {
+                    let message = format!("{} components; 1 or 3 can be written", field.components);
+                    return Err(Error::geometry(format!("frame, field {}", field.name), message));
+                }
+                sized(&format!("field {}", field.name), field.values.len(), items * field.components)?;
+            }
+        }
+        Ok(())
     }
 }

@@ -9,6 +9,8 @@ pub mod frame;
 pub mod linking;
 pub mod quality;
 pub mod report;
+#[cfg(test)]
+pub(crate) mod sample;
 pub mod surface;
 pub mod vector;
 

@@ -1,0 +1,275 @@
+//! Width, thickness, gap and broadness of yarns in their deformed state, all in mm.
+//!
+//! Stations are the slice boundaries of a yarn: all of them where it closes on itself, all but the two cut ends where it
+//! does not. At a station, with the nodes of its section and c their mean:
+//! - t is the direction of the deformed centreline in the plane (x, y), from the section before to the section after;
+//!   n is t turned by +90°;
+//! - width is the extent of the nodes along n;
+//! - thickness is the largest distance in z between the top and the bottom node of a column;
+//! - gap is the distance along n from the outermost node on the +n side to the facing edge of the next yarn of the same
+//!   ply. The edge of a yarn is the chain of its outermost nodes; periodic images up to two cells away count.
+//!   Negative: the two overlap in the plane. NaN: there is no next yarn;
+//! - broadness is width plus gap.
+//!
+//! Unsheared, an undeformed ply has the broadness p (its pitch); under trellis shear without slip p cos γ.
+
+use super::Spread;
+use crate::error::Result;
+use crate::mesh::frame::Frame;
+use crate::mesh::{Block, Mesh, Ply};
+
+/// Sizes of one yarn at its stations, mm.
+#[derive(Debug, Clone)]
+pub struct Yarn {
+    /// Index of the block.
+    pub block: usize,
+    pub ply: Ply,
+    pub width: Vec<f64>,
+    pub thickness: Vec<f64>,
+    pub gap: Vec<f64>,
+    pub broadness: Vec<f64>,
+}
+
+/// Spreads over some stations, mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sizes {
+    pub width: Spread,
+    pub thickness: Spread,
+    pub gap: Spread,
+    pub broadness: Spread,
+}
+
+impl Yarn {
+    /// Spread over the stations of this yarn.
+    pub fn sizes(&self) -> Sizes {
+        Sizes::of([self].into_iter())
+    }
+}
+
+impl Sizes {
+    /// Spread over all stations of some yarns.
+    fn of<'a>(yarns: impl Iterator<Item = &'a Yarn> + Clone) -> Self {
+        let spread =
+            |values: fn(&Yarn) -> &Vec<f64>| Spread::of(yarns.clone().flat_map(move |y| values(y).iter().copied()));
+        Self {
+            width: spread(|y| &y.width),
+            thickness: spread(|y| &y.thickness),
+            gap: spread(|y| &y.gap),
+            broadness: spread(|y| &y.broadness),
+        }
+    }
+}
+
+/// Spread over every station of every yarn of a ply; all NaN if it has no yarns.
+pub fn ply(yarns: &[Yarn], ply: Ply) -> Sizes {
+    Sizes::of(yarns.iter().filter(move |y| y.ply == ply))
+}
+
+/// Sizes of every yarn, blocks in order.
+pub fn measure(mesh: &Mesh, frame: &Frame) -> Result<Vec<Yarn>> {
+    frame.check(mesh)?;
+    let outlines: Vec<Outline> = mesh.blocks.iter().map(|b| Outline::of(mesh, frame, b)).collect();
+    let reach = if mesh.period.is_some() { 2 } else { 0 };
+    let shifts: Vec<[f64; 2]> = (-reach..=reach)
+        .flat_map(|i| (-reach..=reach).map(move |j| [i, j]))
+        .map(|image| frame.shift(mesh.period.unwrap_or_default(), image))
+        .map(|[x, y, _]| [x, y])
+        .collect();
+    let yarn = |(index, block): (usize, &Block)| {
+        let outline = &outlines[index];
+        let neighbours: Vec<(&Outline, [f64; 2])> = (0..mesh.blocks.len())
+            .filter(|&other| mesh.blocks[other].ply == block.ply)
+            .flat_map(|other| shifts.iter().map(move |&shift| (other, shift)))
+            .filter(|&(other, shift)| other != index || shift != [0.0; 2])
+            .map(|(other, shift)| (&outlines[other], shift))
+            .collect();
+        let stations = if block.wrap.is_some() { 0..block.slices } else { 1..block.slices };
+        let (width, gap): (Vec<f64>, Vec<f64>) =
+            stations.clone().map(|s| (outline.width(s), outline.gap(s, &neighbours))).unzip();
+        Yarn {
+            block: index,
+            ply: block.ply,
+            thickness: stations.map(|s| thickness(mesh, frame, block, s)).collect(),
+            broadness: width.iter().zip(&gap).map(|(w, g)| w + g).collect(),
+            width,
+            gap,
+        }
+    };
+    Ok(mesh.blocks.iter().enumerate().map(yarn).collect())
+}
+
+fn thickness(mesh: &Mesh, frame: &Frame, block: &Block, station: usize) -> f64 {
+    let height = |column, layer| frame.position(mesh, block.node(station, column, layer))[2];
+    (0..=block.columns).map(|c| (height(c, block.layers) - height(c, 0)).abs()).fold(f64::NAN, f64::max)
+}
+
+/// A yarn seen along z: centreline and edges at slice boundaries 0 ..= slices, mm.
+struct Outline {
+    centre: Vec<[f64; 2]>,
+    normal: Vec<[f64; 2]>,
+    /// Outermost nodes on the −n and on the +n side.
+    edges: [Vec<[f64; 2]>; 2],
+}
+
+impl Outline {
+    fn of(mesh: &Mesh, frame: &Frame, block: &Block) -> Self {
+        let section = |s: usize| -> Vec<[f64; 2]> {
+            (0..=block.layers)
+                .flat_map(|k| (0..=block.columns).map(move |j| block.node(s, j, k)))
+                .map(|seen| frame.position(mesh, seen))
+                .map(|[x, y, _]| [x, y])
+                .collect()
+        };
+        let sections: Vec<_> = (0..=block.slices).map(section).collect();
+        let centre: Vec<[f64; 2]> = sections.iter().map(|s| mean(s)).collect();
+        // Across the seam of a closed yarn, the section before the first is the last but one, one turn back.
+        let turn = sub(centre[block.slices], centre[0]);
+        let tangent = |s: usize| {
+            let last = block.slices;
+            match block.wrap {
+                Some(_) if s == 0 || s == last => add(sub(centre[1], centre[last - 1]), turn),
+                _ => sub(centre[(s + 1).min(last)], centre[s.saturating_sub(1)]),
+            }
+        };
+        let normal: Vec<[f64; 2]> = (0..=block.slices).map(tangent).map(turned).collect();
+        let outermost = |sign: f64| {
+            let reach = |p: &[f64; 2], s: usize| sign * dot(*p, normal[s]);
+            let outer = |s: usize| sections[s].iter().max_by(|a, b| reach(a, s).total_cmp(&reach(b, s)));
+            (0..=block.slices).map(|s| outer(s).copied().unwrap_or(centre[s])).collect()
+        };
+        Self { edges: [outermost(-1.0), outermost(1.0)], centre, normal }
+    }
+
+    fn width(&self, s: usize) -> f64 {
+        dot(sub(self.edges[1][s], self.edges[0][s]), self.normal[s])
+    }
+
+    /// From the +n edge at a station to the nearest facing edge beyond the centre of the own section.
+    fn gap(&self, s: usize, neighbours: &[(&Outline, [f64; 2])]) -> f64 {
+        let (edge, n) = (self.edges[1][s], self.normal[s]);
+        let least = dot(sub(self.centre[s], edge), n);
+        let mut nearest = f64::NAN;
+        for (other, shift) in neighbours {
+            for (chain, side) in other.edges.iter().zip([1.0, -1.0]) {
+                let facing = |segment: usize| side * dot(n, other.normal[segment]) > 0.0;
+                if let Some((gap, segment)) = crossing(chain, sub(edge, *shift), n, least)
+                    && facing(segment)
+                {
+                    nearest = gap.min(nearest);
+                }
+            }
+        }
+        nearest
+    }
+}
+
+/// Smallest distance above `least` from `start` along `n` at which a chain of points is crossed, and the crossed segment.
+fn crossing(chain: &[[f64; 2]], start: [f64; 2], n: [f64; 2], least: f64) -> Option<(f64, usize)> {
+    let along = |p: [f64; 2]| dot(sub(p, start), [n[1], -n[0]]);
+    let across = |p: [f64; 2]| dot(sub(p, start), n);
+    chain
+        .windows(2)
+        .enumerate()
+        .filter_map(|(i, ends)| {
+            let (a, b) = (along(ends[0]), along(ends[1]));
+            // Closed with a margin: rounding must not lose the seam between two images of a chain.
+            let margin = 1e-9 * (b - a).abs();
+            let crosses = a.min(b) <= margin && a.max(b) >= -margin && margin > 0.0;
+            let distance = crosses.then(|| across(ends[0]) + (across(ends[1]) - across(ends[0])) * a / (a - b))?;
+            (distance > least).then_some((distance, i))
+        })
+        .min_by(|x, y| x.0.total_cmp(&y.0))
+}
+
+fn mean(points: &[[f64; 2]]) -> [f64; 2] {
+    let [x, y] = points.iter().fold([0.0; 2], |sum, p| add(sum, *p));
+    let count = points.len() as f64;
+    [x / count, y / count]
+}
+
+/// Unit vector at +90° to `v`.
+fn turned([x, y]: [f64; 2]) -> [f64; 2] {
+    let length = x.hypot(y);
+    [-y / length, x / length]
+}
+
+fn add(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] + b[0], a[1] + b[1]]
+}
+
+fn sub(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::shear::trellis;
+    use crate::mesh::sample;
+
+    fn close(a: f64, b: f64) -> bool {
+        (a - b).abs() < 1e-12
+    }
+
+    #[test]
+    fn straight_yarns_have_their_nominal_sizes() {
+        let mesh = sample::plies();
+        let yarns = measure(&mesh, &sample::frame(&mesh, [[1.0, 0.0], [0.0, 1.0]])).unwrap();
+        for (which, width, pitch) in [(Ply::Warp, 4.59, 5.0), (Ply::Weft, 2.08, 2.5)] {
+            let sizes = ply(&yarns, which);
+            assert!(close(sizes.width.min, width) && close(sizes.width.max, width));
+            assert!(close(sizes.thickness.mean, 0.38));
+            assert!(close(sizes.gap.min, pitch - width) && close(sizes.gap.max, pitch - width), "{:?}", sizes.gap);
+            assert!(close(sizes.broadness.mean, pitch) && sizes.broadness.std < 1e-12);
+        }
+        assert!(yarns.iter().all(|y| y.width.len() == mesh.blocks[y.block].slices));
+    }
+
+    #[test]
+    fn rigid_motion_changes_nothing() {
+        let mesh = sample::plies();
+        let (s, c) = 0.7_f64.sin_cos();
+        let mut frame = sample::frame(&mesh, [[c, -s], [s, c]]);
+        frame.positions.iter_mut().for_each(|p| *p = [p[0] + 3.0, p[1] - 8.0, p[2] + 1.0]);
+        let sizes = ply(&measure(&mesh, &frame).unwrap(), Ply::Warp);
+        assert!(close(sizes.width.mean, 4.59) && close(sizes.gap.max, 0.41) && close(sizes.thickness.mean, 0.38));
+    }
+
+    #[test]
+    fn trellis_shear_without_slip_gives_pitch_times_cosine() {
+        let mesh = sample::plies();
+        for degrees in [-50.0_f64, -15.0, 20.0, 60.0] {
+            let angle = degrees.to_radians();
+            let yarns = measure(&mesh, &sample::frame(&mesh, trellis(angle))).unwrap();
+            for (which, width, pitch) in [(Ply::Warp, 4.59, 5.0), (Ply::Weft, 2.08, 2.5)] {
+                let sizes = ply(&yarns, which);
+                assert!(
+                    close(sizes.broadness.min, pitch * angle.cos()) && close(sizes.broadness.max, pitch * angle.cos())
+                );
+                assert!(close(sizes.width.mean, width * angle.cos()));
+            }
+        }
+    }
+
+    #[test]
+    fn without_neighbours_there_is_no_gap() {
+        let mut mesh = sample::plies();
+        mesh.period = None;
+        mesh.blocks.truncate(1);
+        mesh.blocks[0].wrap = None;
+        mesh.blocks[0].slices -= 1;
+        let yarns = measure(&mesh, &sample::frame(&mesh, [[1.0, 0.0], [0.0, 1.0]])).unwrap();
+        assert_eq!(yarns[0].width.len(), mesh.blocks[0].slices - 1);
+        assert!(yarns[0].sizes().gap.mean.is_nan() && yarns[0].sizes().broadness.mean.is_nan());
+    }
+
+    #[test]
+    fn a_frame_of_another_mesh_is_refused() {
+        let mesh = sample::plies();
+        assert!(measure(&mesh, &Frame::default()).unwrap_err().to_string().contains("positions"));
+    }
+}
