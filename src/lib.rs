@@ -12,4 +12,5 @@ pub mod materials;
 pub mod measure;
 pub mod mesh;
 pub mod output;
+pub mod plan;
 pub mod run;

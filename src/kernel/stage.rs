@@ -35,6 +35,8 @@ pub struct Stage {
     /// Small constants of the stage, laid out as the kernel's `Params`.
     pub params: Vec<u8>,
     pub kernel: CpuKernel,
+    /// Whether it must wait for the stages before it; else it may run beside them.
+    pub waits: bool,
 }
 
 /// Everything a backend needs to run a scene.

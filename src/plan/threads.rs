@@ -1,0 +1,111 @@
+//! Tables of the beams: ends, vectors, stiffness, rest curvature, slots of nodes, lumped mass.
+
+use crate::dynamics::assemble::{NONE, THREAD};
+use crate::elements::bend::smoothed;
+use crate::kernel::position::{QUANTUM, quanta};
+use crate::mesh::Mesh;
+
+/// Tables of all beams of a mesh.
+#[derive(Default)]
+pub struct Threads {
+    pub ends: Vec<u32>,
+    /// See [`crate::elements::beam2::TABLE`].
+    pub beams: Vec<f64>,
+    /// Beams of each bend.
+    pub pairs: Vec<u32>,
+    /// See [`crate::elements::bend::BEND`].
+    pub bends: Vec<f64>,
+    /// Slots of each thread node.
+    pub slots: Vec<u32>,
+    /// Lumped mass of thread nodes, tonne.
+    pub mass: Vec<f64>,
+    /// Length that belongs to each thread node, mm.
+    pub tributary: Vec<f64>,
+    /// EA/L₀ of the beam that starts at each thread node, N/mm.
+    pub line_stiffness: Vec<f64>,
+    /// Row sum of bending stiffness of each thread node, N/mm.
+    pub bending_stiffness: Vec<f64>,
+    /// Thread of each beam.
+    pub thread: Vec<u32>,
+    /// See [`crate::contact::threads::ARC`].
+    pub arcs: Vec<f64>,
+    /// Radius of each thread node, mm.
+    pub radius: Vec<f64>,
+}
+
+impl Threads {
+    /// Tables of a mesh, with or without bends.
+    pub fn new(mesh: &Mesh, bending: bool) -> Self {
+        let first = mesh.first_thread_node();
+        let nodes = mesh.nodes.len() - first;
+        let mut t = Self {
+            slots: vec![NONE; THREAD * nodes],
+            mass: vec![0.0; nodes],
+            tributary: vec![0.0; nodes],
+            line_stiffness: vec![0.0; nodes],
+            bending_stiffness: vec![0.0; nodes],
+            radius: vec![0.0; nodes],
+            ..Self::default()
+        };
+        for (number, thread) in mesh.threads.iter().enumerate() {
+            let base = t.thread.len();
+            let count = thread.beams();
+            t.radius[thread.first - first..][..thread.count].fill(thread.radius);
+            let mut arc = 0.0;
+            let mut lengths = Vec::with_capacity(count);
+            for i in 0..count {
+                let [a, b] = thread.beam(i);
+                let (from, to) = (mesh.position(a).map(quanta), mesh.position(b).map(quanta));
+                let d = [0, 1, 2].map(|k| f64::from(to[k] - from[k]) * QUANTUM);
+                let length = libm::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+                t.ends.extend([a.node as u32, b.node as u32]);
+                t.beams.extend([d[0], d[1], d[2], length, thread.axial, thread.thermal_strain]);
+                t.thread.push(number as u32);
+                t.arcs.extend([arc + 0.5 * length, length, 0.0]);
+                arc += length;
+                lengths.push(length);
+                for node in [a.node - first, b.node - first] {
+                    t.mass[node] += 0.5 * length * thread.linear_density;
+                    t.tributary[node] += 0.5 * length;
+                }
+                t.line_stiffness[a.node - first] = thread.axial / length;
+                t.slots[THREAD * (a.node - first)] = (base + i) as u32;
+                t.slots[THREAD * (b.node - first) + 1] = (base + i) as u32;
+            }
+            if thread.wrap.is_some() {
+                for beam in base..base + count {
+                    t.arcs[3 * beam + 2] = arc;
+                }
+            }
+            if !bending || thread.bending == 0.0 {
+                continue;
+            }
+            let bends = if thread.wrap.is_some() { count } else { count - 1 };
+            for i in 0..bends {
+                let pair = [base + i, base + (i + 1) % count];
+                let bend = t.pairs.len() / 2;
+                let tangent = |beam: usize| {
+                    let row = &t.beams[6 * beam..][..4];
+                    [row[0] / row[3], row[1] / row[3], row[2] / row[3]]
+                };
+                let (u, v) = (tangent(pair[0]), tangent(pair[1]));
+                let cosine = (u[0] * v[0] + u[1] * v[1] + u[2] * v[2]).clamp(-0.98, 1.0);
+                let turn = libm::sqrt((1.0 - cosine) / (1.0 + cosine)) * thread.rest_curvature;
+                let (l1, l2) = (lengths[i], lengths[(i + 1) % count]);
+                let stiffness = 2.0 * thread.bending / (0.5 * (l1 + l2));
+                t.bends.extend([stiffness, smoothed(turn)]);
+                t.pairs.extend(pair.map(|b| b as u32));
+                // E ≈ S/4 |v₀/l₁ − v₁ (1/l₁ + 1/l₂) + v₂/l₂|²: row sums of its stiffness
+                let weights = [1.0 / l1, 1.0 / l1 + 1.0 / l2, 1.0 / l2];
+                let total: f64 = weights.iter().sum();
+                let nodes = [t.ends[2 * pair[0]], t.ends[2 * pair[0] + 1], t.ends[2 * pair[1] + 1]];
+                for (place, (node, weight)) in nodes.into_iter().zip(weights).enumerate() {
+                    let node = node as usize - first;
+                    t.bending_stiffness[node] += 0.5 * stiffness * weight * total;
+                    t.slots[THREAD * node + 2 + place] = bend as u32;
+                }
+            }
+        }
+        t
+    }
+}
