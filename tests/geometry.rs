@@ -1,5 +1,7 @@
 //! The generated fabric against known answers: counts, lengths, clearances, interlocking, masses, surfaces, refusals.
 
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use serde_json::{Value, json};
 use tricot::case::Case;
 use tricot::case::fabric::Fabric;
@@ -324,6 +326,71 @@ fn what_cannot_be_built_is_refused_with_its_field() {
     }
     let no_fabric = build(&serde_json::from_value(case()).unwrap(), None).unwrap_err().to_string();
     assert!(no_fabric.starts_with("fabric"), "{no_fabric}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
+
+    /// Whatever the sizes, a fabric is refused, or built whole: well-shaped, finite, interlocked.
+    #[test]
+    fn any_fabric_is_built_or_refused(
+        pitch in [1.0..12.0, 1.0..12.0],
+        share in [0.1..1.0, 0.1..1.0],
+        thickness in [0.05..1.5, 0.05..1.5],
+        truncation in [0.5..0.99, 0.5..0.99],
+        radius in 0.02..0.4,
+        clearance in [0.0..0.3, 0.0..0.1],
+        ramp in 0.0..3.0,
+        lap in prop::sample::select(vec!["open", "closed"]),
+    ) {
+        let mut changes = Vec::new();
+        let yarns = [["/warp/pitch_mm", "/warp/width_mm", "/warp/thickness_mm", "/warp/truncation"],
+                     ["/weft/pitch_mm", "/weft/width_mm", "/weft/thickness_mm", "/weft/truncation"]];
+        for (i, names) in yarns.into_iter().enumerate() {
+            let values = [pitch[i], share[i] * pitch[i], thickness[i], truncation[i]];
+            changes.extend(names.into_iter().zip(values.map(|v| json!(v))));
+        }
+        changes.push(("/stitch/radius_mm", json!(radius)));
+        changes.push(("/stitch/clearance_thread_mm", json!(clearance[0])));
+        changes.push(("/stitch/clearance_yarn_mm", json!(clearance[1])));
+        changes.push(("/stitch/underlap_ramp_mm", json!(ramp)));
+        changes.push(("/stitch/lap", json!(lap)));
+        if let Ok(mesh) = made(case(), with(fabric(0.03, 0.01), &changes)) {
+            prop_assert!(mesh.nodes.iter().flatten().all(|x| x.is_finite()));
+            prop_assert!(mesh.blocks.iter().all(|b| quality::scaled_jacobian(&mesh, b) > 0.0 && b.density > 0.0));
+            for thread in &mesh.threads {
+                for beam in 0..thread.beams() {
+                    let [a, b] = thread.beam(beam).map(|n| mesh.position(n));
+                    prop_assert!(norm(sub(b, a)) > 0.0);
+                }
+            }
+            prop_assert!(linking::links(&mesh).iter().all(linking::Link::holds));
+        }
+    }
+}
+
+#[test]
+fn a_scene_without_period_is_reported_too() {
+    let scene = json!({ "mesh": { "threads": [
+        { "name": "a", "nodes": [[0, 0, 0], [1, 0, 0]], "radius_mm": 0.1, "axial_n": 1, "linear_density_tex": 1 },
+        { "name": "b", "nodes": [[0.5, -1, 0.3], [0.5, 1, 0.3]], "radius_mm": 0.05, "axial_n": 1, "linear_density_tex": 1 }
+    ] } });
+    let case: Case = serde_json::from_value(with(case(), &[("/domain", scene)])).unwrap();
+    let mesh = build(&case, None).unwrap();
+    let report = report(&mesh, &case);
+    assert!((report.clearances[2].as_ref().unwrap().gap - 0.15).abs() < 1e-6);
+    assert_eq!(report.lengths, [3.0, 0.0, 0.0]);
+    assert!(report.to_string().contains("2 threads, no period"));
+}
+
+#[test]
+fn coordinates_beyond_reach_are_refused() {
+    let scene = json!({ "mesh": { "threads": [
+        { "name": "a", "nodes": [[0, 0, 0], [251, 0, 0]], "radius_mm": 0.1, "axial_n": 1, "linear_density_tex": 1 }
+    ] } });
+    let case: Case = serde_json::from_value(with(case(), &[("/domain", scene)])).unwrap();
+    let message = build(&case, None).unwrap_err().to_string();
+    assert!(message.contains("251") && message.contains("250"), "{message}");
 }
 
 #[test]

@@ -60,7 +60,7 @@ fn check_yarn(yarn: &Yarn, name: &str) -> Result<()> {
 
 fn check(fabric: &Fabric, resolution: &Resolution, warps: usize, wefts: usize) -> Result<()> {
     require(warps >= 2, "domain.cell.warps", || format!("is {warps}, but a cell needs at least 2 warps"))?;
-    require(wefts >= 2 && wefts % 2 == 0, "domain.cell.wefts", || {
+    require(wefts >= 2 && wefts.is_multiple_of(2), "domain.cell.wefts", || {
         format!("is {wefts}, but must be even and at least 2: the stitch repeats after two wefts")
     })?;
     check_yarn(&fabric.warp, "warp")?;
@@ -207,14 +207,14 @@ fn check_contact(case: &Case, fabric: &Fabric, mesh: &Mesh) -> Result<()> {
         } else {
             String::new()
         };
+        let other = if start.other == start.thread { "another of its own beams" } else { &start.other };
         Err(Error::geometry(
             what,
             format!(
-                "{} starts {:.3} mm inside {}: its contact radius {radius} mm is taken up from {ratio} of that, which allows \
-                 {:.3} mm; {advice}{ratio_advice}",
+                "{} starts {:.3} mm inside {other}; contact starts at {ratio} of the radius of {radius} mm, which takes up \
+                 at most {:.3} mm; {advice}{ratio_advice}",
                 start.thread,
                 -start.gap,
-                start.other,
                 (1.0 - ratio + DEPTH) * between
             ),
         ))

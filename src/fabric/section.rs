@@ -61,18 +61,26 @@ impl Section {
             .collect()
     }
 
-    /// Point of the whole ellipse whose outward normal points along `angle`, pushed outwards by `distance`.
-    pub fn offset_at(&self, angle: f64, distance: f64) -> [f64; 2] {
+    /// Point of the outline where the outward normal points along `angle`: on the ellipse, or the corner at a cut.
+    fn facing(&self, angle: f64) -> [f64; 2] {
         let [a, b] = self.half_axes();
-        let normal = [cos(angle), sin(angle)];
-        let support = (a * a * normal[0] * normal[0] + b * b * normal[1] * normal[1]).sqrt();
-        [a * a * normal[0] / support + distance * normal[0], b * b * normal[1] / support + distance * normal[1]]
+        let [c, s] = [cos(angle), sin(angle)];
+        let whole = libm::hypot(a * c, b * s);
+        let u = a * a * c / whole;
+        let half = self.width / 2.0;
+        if u.abs() <= half { [u, b * b * s / whole] } else { [half.copysign(c), self.edge().copysign(s)] }
     }
 
-    /// Distance from the centre of the tangent to the whole ellipse whose outward normal points along `angle`.
+    /// Point at a distance from the outline, where its outward normal points along `angle`.
+    pub fn offset_at(&self, angle: f64, distance: f64) -> [f64; 2] {
+        let [u, v] = self.facing(angle);
+        [u + distance * cos(angle), v + distance * sin(angle)]
+    }
+
+    /// Distance from the centre of the tangent whose outward normal points along `angle`.
     pub fn support(&self, angle: f64) -> f64 {
-        let [a, b] = self.half_axes();
-        libm::hypot(a * cos(angle), b * sin(angle))
+        let [u, v] = self.facing(angle);
+        u * cos(angle) + v * sin(angle)
     }
 
     /// Angle of the outward normal of the ellipse at `u` on its upper half, 0 to π.
@@ -184,5 +192,7 @@ mod tests {
         assert!((u * cos(angle) + v * sin(angle) - WEFT.support(angle)).abs() < 1e-12);
         assert!((WEFT.normal_angle(u) - angle).abs() < 1e-12);
         assert!((v - WEFT.half_thickness(u)).abs() < 1e-12);
+        let [u, v] = WEFT.offset_at(PI + 0.1, 0.2);
+        assert!((u + 1.04 + 0.2 * cos(0.1)).abs() < 1e-12 && (v + WEFT.edge() + 0.2 * sin(0.1)).abs() < 1e-12);
     }
 }

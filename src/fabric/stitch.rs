@@ -120,21 +120,23 @@ impl Layout {
         let excess = |angle: f64| {
             self.bend + centre[0] * cos(angle) + centre[1] * sin(angle) - self.stand_off - self.weft.support(angle)
         };
-        let [mut low, mut high] = [1.5 * PI - 0.9, 1.5 * PI + 0.9];
-        let sign = excess(low).signum();
-        if sign == excess(high).signum() {
+        // Between its two tangents the weft lies inside the half plane of the bend: start there and close in on the lower one.
+        let candidates = (0..=64).map(|i| PI * (1.0 + f64::from(i) / 64.0));
+        let [mut low, mut high] =
+            [candidates.fold(PI, |best, angle| if excess(angle) > excess(best) { angle } else { best }), 2.0 * PI];
+        if excess(low) <= 0.0 || excess(high) >= 0.0 {
             return Err(Error::geometry(
-                "fabric.weft",
+                "fabric.weft.thickness_mm",
                 format!(
-                    "no straight line touches both the weft (width_mm = {}, thickness_mm = {}) and a loop bent with radius \
-                     {:.3} mm; lower fabric.stitch.radius_mm or widen the weft",
+                    "no straight line touches both a weft of {} × {} mm and a loop bent with radius {:.3} mm; lower \
+                     fabric.weft.thickness_mm or fabric.stitch.radius_mm",
                     self.weft.width, self.weft.thickness, self.bend
                 ),
             ));
         }
         for _ in 0..80 {
             let middle = 0.5 * (low + high);
-            if excess(middle).signum() == sign {
+            if excess(middle) > 0.0 {
                 low = middle;
             } else {
                 high = middle;
