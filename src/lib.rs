@@ -4,3 +4,4 @@ pub mod case;
 pub mod error;
 pub mod measure;
 pub mod mesh;
+pub mod output;

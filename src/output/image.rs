@@ -1,0 +1,112 @@
+//! A picture in memory, and how it becomes a PNG.
+
+use super::colour::{Rgb, encode};
+use super::file::replace;
+use crate::error::Result;
+use std::io;
+use std::path::Path;
+
+/// Rows of pixels from the top, linear RGB.
+#[derive(Debug, Clone)]
+pub struct Image {
+    pub width: usize,
+    pub height: usize,
+    pixels: Vec<Rgb>,
+}
+
+impl Image {
+    /// An image of one colour.
+    pub fn new(width: usize, height: usize, colour: Rgb) -> Self {
+        Self { width, height, pixels: vec![colour; width * height] }
+    }
+
+    /// The pixel at a place inside.
+    pub fn pixel(&self, x: usize, y: usize) -> Rgb {
+        self.pixels[y * self.width + x]
+    }
+
+    /// Covers a share of a pixel with a colour; places outside are left out.
+    pub fn cover(&mut self, x: i64, y: i64, colour: Rgb, share: f32) {
+        if x < 0 || y < 0 || x >= self.width as i64 || y >= self.height as i64 {
+            return;
+        }
+        let pixel = &mut self.pixels[y as usize * self.width + x as usize];
+        *pixel = std::array::from_fn(|i| pixel[i] + share * (colour[i] - pixel[i]));
+    }
+
+    /// Fills a rectangle given by its left, top, width and height, px.
+    pub fn fill(&mut self, [left, top, width, height]: [f32; 4], colour: Rgb) {
+        let overlap =
+            |low: f32, size: f32, at: i64| ((low + size).min(at as f32 + 1.0) - low.max(at as f32)).clamp(0.0, 1.0);
+        for y in top.floor() as i64..(top + height).ceil() as i64 {
+            for x in left.floor() as i64..(left + width).ceil() as i64 {
+                self.cover(x, y, colour, overlap(left, width, x) * overlap(top, height, y));
+            }
+        }
+    }
+
+    /// Pastes an image that is `factor` times finer, averaging its pixels.
+    pub fn paste(&mut self, left: usize, top: usize, fine: &Image, factor: usize) {
+        let weight = 1.0 / (factor * factor) as f32;
+        for y in 0..fine.height / factor {
+            for x in 0..fine.width / factor {
+                let mut sum = [0.0_f32; 3];
+                for row in 0..factor {
+                    for column in 0..factor {
+                        let pixel = fine.pixel(x * factor + column, y * factor + row);
+                        (0..3).for_each(|i| sum[i] += weight * pixel[i]);
+                    }
+                }
+                self.cover((left + x) as i64, (top + y) as i64, sum, 1.0);
+            }
+        }
+    }
+
+    /// Rows of pixels to write to, from the top.
+    pub fn rows_mut(&mut self) -> &mut [Rgb] {
+        &mut self.pixels
+    }
+
+    /// Writes the image, whole or not at all.
+    pub fn write_png(&self, path: &Path) -> Result<()> {
+        let bytes: Vec<u8> = self.pixels.iter().flat_map(|&p| encode(p)).collect();
+        replace(path, |w| {
+            let mut encoder = png::Encoder::new(w, self.width as u32, self.height as u32);
+            encoder.set_color(png::ColorType::Rgb);
+            encoder.set_depth(png::BitDepth::Eight);
+            let mut writer = encoder.write_header().map_err(io::Error::other)?;
+            writer.write_image_data(&bytes).map_err(io::Error::other)?;
+            writer.finish().map_err(io::Error::other)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn png_reads_back() {
+        let mut image = Image::new(5, 4, [1.0; 3]);
+        image.fill([1.0, 1.0, 2.0, 1.0], [0.0; 3]);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        image.write_png(&path).unwrap();
+        let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
+        let mut reader = png::Decoder::new(file).read_info().unwrap();
+        let mut bytes = vec![0; 60];
+        reader.next_frame(&mut bytes).unwrap();
+        assert_eq!((reader.info().width, reader.info().height), (5, 4));
+        let dark: Vec<usize> = (0..20).filter(|i| bytes[3 * i] == 0).collect();
+        assert_eq!(dark, [6, 7]);
+    }
+
+    #[test]
+    fn paste_averages() {
+        let mut fine = Image::new(4, 2, [0.0; 3]);
+        fine.fill([0.0, 0.0, 1.0, 2.0], [1.0; 3]);
+        let mut image = Image::new(2, 1, [0.0; 3]);
+        image.paste(0, 0, &fine, 2);
+        assert_eq!([image.pixel(0, 0)[0], image.pixel(1, 0)[0]], [0.5, 0.0]);
+    }
+}

@@ -1,0 +1,17 @@
+//! What a run leaves on disk: frames for ParaView, tables and pictures. Everything is written from a [`Mesh`](crate::mesh::Mesh)
+//! and a [`Frame`](crate::mesh::frame::Frame) or from plain numbers; nothing here computes a result.
+//!
+//! - [`vtu`]: frames and their collection; [`table`]: CSV files;
+//! - [`picture`] renders a frame: [`scene`] turns it into triangles, [`raster`] draws those into a depth buffer and lights
+//!   them, [`image`] holds pixels, with letters from [`text`] and colours from [`colour`];
+//! - [`file`]: how a file is replaced as a whole or not at all.
+
+pub mod colour;
+pub mod file;
+pub mod image;
+pub mod picture;
+pub mod raster;
+pub mod scene;
+pub mod table;
+pub mod text;
+pub mod vtu;

@@ -1,0 +1,328 @@
+//! Surfaces to draw: yarns as their outer faces, threads as tubes, each corner with a normal and a colour.
+//!
+//! Tubes follow a smooth curve through the beams' nodes (Catmull–Rom), so that a loop of few beams looks round; colours of
+//! beams stay constant along each beam.
+
+use super::colour::{self, Rgb};
+use crate::error::{Error, Result};
+use crate::mesh::frame::{Field, Frame};
+use crate::mesh::{Block, Mesh, Ply, Thread};
+
+/// Sides of a tube, and pieces per beam.
+const SIDES: usize = 14;
+const PIECES: usize = 4;
+
+/// Height of one turn of a thread's twist, mm.
+const TWIST: f32 = 0.45;
+
+/// Everything that is drawn once per periodic image.
+#[derive(Debug, Clone, Default)]
+pub struct Scene {
+    pub quads: Vec<Quad>,
+    /// Name and range of the field that gives the colours.
+    pub legend: Option<(String, [f64; 2])>,
+}
+
+/// A piece of surface. Corners go around; the edge from corner 0 to corner 1 follows the fibre.
+#[derive(Debug, Clone, Copy)]
+pub struct Quad {
+    /// mm.
+    pub corners: [[f32; 3]; 4],
+    /// Outward, unit length.
+    pub normals: [[f32; 3]; 4],
+    pub colours: [Rgb; 4],
+    /// Coordinates of the filament pattern at each corner: across the fibre (yarns: mm, threads: turns), along it (share of
+    /// the length), and the length (yarns: mm, threads: whole turns of the twist).
+    pub grain: [[f32; 3]; 4],
+    pub kind: Kind,
+}
+
+/// What a surface is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    Yarn,
+    Thread,
+}
+
+/// Values that colour the bodies.
+struct Paint<'a> {
+    node: Option<&'a Field>,
+    hex: Option<&'a Field>,
+    beam: Option<&'a Field>,
+    range: [f64; 2],
+}
+
+impl Paint<'_> {
+    fn value(field: &Field, item: usize) -> f64 {
+        let values = &field.values[item * field.components..][..field.components];
+        if field.components == 1 { values[0] } else { values.iter().map(|v| v * v).sum::<f64>().sqrt() }
+    }
+
+    fn colour(&self, value: f64) -> Rgb {
+        let [low, high] = self.range;
+        colour::map(if high > low { ((value - low) / (high - low)) as f32 } else { 0.5 })
+    }
+}
+
+/// Surfaces of a frame, coloured by ply or by a field.
+pub fn build(mesh: &Mesh, frame: &Frame, field: Option<&str>) -> Result<Scene> {
+    frame.check(mesh)?;
+    let paint = field.map(|name| paint(frame, name)).transpose()?;
+    let mut scene = Scene { legend: field.zip(paint.as_ref()).map(|(n, p)| (n.into(), p.range)), ..Scene::default() };
+    let mut first = 0;
+    for (index, block) in mesh.blocks.iter().enumerate() {
+        surfaces(&mut scene.quads, mesh, frame, block, (first, index), paint.as_ref());
+        first += block.hexes();
+    }
+    first = 0;
+    for thread in &mesh.threads {
+        tube(&mut scene.quads, mesh, frame, thread, first, paint.as_ref());
+        first += thread.beams();
+    }
+    Ok(scene)
+}
+
+/// The fields of this name, and their common range.
+fn paint<'a>(frame: &'a Frame, name: &str) -> Result<Paint<'a>> {
+    let find = |fields: &'a [Field]| fields.iter().find(|f| f.name == name);
+    let (node, hex, beam) = (find(&frame.node_fields), find(&frame.hex_fields), find(&frame.beam_fields));
+    let found: Vec<&Field> = [node, hex, beam].into_iter().flatten().collect();
+    if found.is_empty() {
+        let all = [&frame.node_fields, &frame.hex_fields, &frame.beam_fields];
+        let names: Vec<&str> = all.into_iter().flatten().map(|f| f.name.as_str()).collect();
+        let names = if names.is_empty() { "none".to_string() } else { names.join(", ") };
+        return Err(Error::case("picture", format!("no field is named {name:?}; available: {names}")));
+    }
+    let values = found.iter().flat_map(|f| (0..f.values.len() / f.components).map(|i| Paint::value(f, i)));
+    let (low, high) = values
+        .filter(|v| v.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    let range = if low <= high { [low, high] } else { [0.0, 0.0] };
+    Ok(Paint { node, hex, beam, range })
+}
+
+/// Outer faces of a block; `(first, index)` are the number of its first hexahedron and its own.
+fn surfaces(
+    quads: &mut Vec<Quad>,
+    mesh: &Mesh,
+    frame: &Frame,
+    block: &Block,
+    (first, index): (usize, usize),
+    paint: Option<&Paint>,
+) {
+    let (slices, columns, layers) = (block.slices, block.columns, block.layers);
+    // A face is a grid: (i, j) on it to (slice, column, layer); `flip` where i × j points inward.
+    type Place = fn(usize, usize, usize) -> [usize; 3];
+    let mut faces: Vec<(usize, usize, usize, bool, Place)> = vec![
+        (slices, columns, 0, true, |i, j, at| [i, j, at]),
+        (slices, columns, layers, false, |i, j, at| [i, j, at]),
+        (slices, layers, 0, false, |i, j, at| [i, at, j]),
+        (slices, layers, columns, true, |i, j, at| [i, at, j]),
+    ];
+    if block.wrap.is_none() {
+        faces.push((columns, layers, 0, true, |i, j, at| [at, i, j]));
+        faces.push((columns, layers, slices, false, |i, j, at| [at, i, j]));
+    }
+    let position = |[s, c, l]: [usize; 3]| frame.position(mesh, block.node(s, c, l)).map(|v| v as f32);
+    let base = match block.ply {
+        Ply::Warp => colour::warp(),
+        Ply::Weft => colour::weft(),
+        Ply::Free => colour::free(),
+    };
+    for (face, &(rows, across, at, flip, place)) in faces.iter().enumerate() {
+        let point = |i: usize, j: usize| position(place(i, j, at));
+        // Normals from neighbours on the grid; a closed yarn continues beyond its ends.
+        let closed = block.wrap.is_some();
+        let along = |i: usize, j: usize| match (closed, i == 0 || i == rows) {
+            (true, true) => add(sub(point(1, j), point(0, j)), sub(point(rows, j), point(rows - 1, j))),
+            _ => sub(point((i + 1).min(rows), j), point(i.saturating_sub(1), j)),
+        };
+        let over = |i: usize, j: usize| sub(point(i, (j + 1).min(across)), point(i, j.saturating_sub(1)));
+        let normal = |i: usize, j: usize| {
+            let n = unit(cross(along(i, j), over(i, j)));
+            if flip { n.map(|v| -v) } else { n }
+        };
+        let offset = 17.3 * (index * 8 + face) as f32;
+        let width = norm(sub(position([0, columns, 0]), position([0, 0, 0])));
+        let length = norm(sub(position([slices, 0, 0]), position([0, 0, 0])));
+        let grain = |i: usize, j: usize| {
+            let [s, c, l] = place(i, j, at).map(|v| v as f32);
+            [offset + c / columns as f32 * width + 0.2 * l, s / slices as f32, length]
+        };
+        for i in 0..rows {
+            for j in 0..across {
+                let ends = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
+                let colours = ends.map(|[a, b]| {
+                    let Some(paint) = paint else { return base };
+                    if let Some(field) = paint.hex {
+                        let [s, c, l] = place(i, j, at);
+                        let (s, c, l) = (s.min(slices - 1), c.min(columns - 1), l.min(layers - 1));
+                        return paint.colour(Paint::value(field, first + (l * columns + c) * slices + s));
+                    }
+                    let [s, c, l] = place(a, b, at);
+                    paint.node.map_or(colour::plain(), |f| paint.colour(Paint::value(f, block.node(s, c, l).node)))
+                });
+                quads.push(Quad {
+                    corners: ends.map(|[a, b]| point(a, b)),
+                    normals: ends.map(|[a, b]| normal(a, b)),
+                    colours,
+                    grain: ends.map(|[a, b]| grain(a, b)),
+                    kind: Kind::Yarn,
+                });
+            }
+        }
+    }
+}
+
+/// A round tube along a thread whose first beam has the number `first`.
+fn tube(quads: &mut Vec<Quad>, mesh: &Mesh, frame: &Frame, thread: &Thread, first: usize, paint: Option<&Paint>) {
+    let beams = thread.beams();
+    if beams == 0 {
+        return;
+    }
+    let mut points: Vec<[f32; 3]> =
+        (0..beams).map(|i| frame.position(mesh, thread.beam(i)[0]).map(|v| v as f32)).collect();
+    points.push(frame.position(mesh, thread.beam(beams - 1)[1]).map(|v| v as f32));
+    let turn = sub(points[beams], points[0]);
+    let closed = thread.wrap.is_some();
+    let before = if closed { sub(points[beams - 1], turn) } else { points[0] };
+    let after = if closed { add(points[1], turn) } else { points[beams] };
+    let at = |i: usize| match i {
+        0 => before,
+        i if i <= beams + 1 => points[i - 1],
+        _ => after,
+    };
+    // Points and directions of the smooth curve, PIECES a beam.
+    let curve: Vec<([f32; 3], [f32; 3])> = (0..=beams * PIECES)
+        .map(|k| {
+            let beam = (k / PIECES).min(beams - 1);
+            let t = (k - beam * PIECES) as f32 / PIECES as f32;
+            catmull_rom([at(beam), at(beam + 1), at(beam + 2), at(beam + 3)], t)
+        })
+        .collect();
+    let mut side = unit(perpendicular(curve[0].1));
+    let mut run = 0.0;
+    let mut rings: Vec<([[f32; 3]; SIDES], f32)> = Vec::with_capacity(curve.len());
+    for (k, &(point, direction)) in curve.iter().enumerate() {
+        // Carried along without twisting.
+        side = unit(sub(side, scale(direction, dot(side, direction))));
+        let up = cross(direction, side);
+        run += if k == 0 { 0.0 } else { norm(sub(point, curve[k - 1].0)) };
+        let radial = |n: usize| {
+            let (s, c) = (std::f32::consts::TAU * n as f32 / SIDES as f32).sin_cos();
+            add(scale(side, c), scale(up, s))
+        };
+        rings.push((std::array::from_fn(radial), run));
+    }
+    let radius = thread.radius as f32;
+    for k in 0..beams * PIECES {
+        let (beam, piece) = (k / PIECES, k % PIECES);
+        let colour = |end: usize| {
+            let Some(paint) = paint else { return colour::thread() };
+            if let Some(field) = paint.beam {
+                return paint.colour(Paint::value(field, first + beam));
+            }
+            let Some(field) = paint.node else { return colour::plain() };
+            let [a, b] = thread.beam(beam).map(|seen| Paint::value(field, seen.node));
+            paint.colour(a + (b - a) * (piece + end) as f64 / PIECES as f64)
+        };
+        for n in 0..SIDES {
+            let ends = [[0, n], [1, n], [1, n + 1], [0, n + 1]];
+            let radial = |[end, n]: [usize; 2]| rings[k + end].0[n % SIDES];
+            quads.push(Quad {
+                corners: ends.map(|e| add(curve[k + e[0]].0, scale(radial(e), radius))),
+                normals: ends.map(radial),
+                colours: ends.map(|e| colour(e[0])),
+                grain: ends.map(|[end, n]| [n as f32 / SIDES as f32, rings[k + end].1 / run, (run / TWIST).round()]),
+                kind: Kind::Thread,
+            });
+        }
+    }
+}
+
+/// Point and unit direction on the curve from `p[1]` (t = 0) to `p[2]` (t = 1).
+fn catmull_rom(p: [[f32; 3]; 4], t: f32) -> ([f32; 3], [f32; 3]) {
+    let coefficients = |i: usize| {
+        let [a, b, c, d] = p.map(|v| v[i]);
+        [b, 0.5 * (c - a), a - 2.5 * b + 2.0 * c - 0.5 * d, 0.5 * (d - a) + 1.5 * (b - c)]
+    };
+    let point = std::array::from_fn(|i| {
+        let [a, b, c, d] = coefficients(i);
+        a + t * (b + t * (c + t * d))
+    });
+    let direction = std::array::from_fn(|i| {
+        let [_, b, c, d] = coefficients(i);
+        b + t * (2.0 * c + t * 3.0 * d)
+    });
+    (point, unit(direction))
+}
+
+fn perpendicular(v: [f32; 3]) -> [f32; 3] {
+    cross(v, if v[2].abs() < 0.7 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] })
+}
+
+pub(super) fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|i| a[i] + b[i])
+}
+
+pub(super) fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+pub(super) fn scale(a: [f32; 3], s: f32) -> [f32; 3] {
+    a.map(|v| v * s)
+}
+
+pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(super) fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn norm(a: [f32; 3]) -> f32 {
+    dot(a, a).sqrt()
+}
+
+/// Unit vector; a zero vector stays zero.
+pub(super) fn unit(a: [f32; 3]) -> [f32; 3] {
+    scale(a, 1.0 / norm(a).max(1e-30))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::sample;
+
+    #[test]
+    fn surfaces_are_closed_and_face_outward() {
+        let mesh = sample::plies();
+        let frame = sample::frame(&mesh, [[1.0, 0.0], [0.0, 1.0]]);
+        let scene = build(&mesh, &frame, None).unwrap();
+        let faces = |b: &Block| 2 * b.slices * (b.columns + b.layers);
+        let wanted = mesh.blocks.iter().map(faces).sum::<usize>() + mesh.beams() * PIECES * SIDES;
+        assert_eq!(scene.quads.len(), wanted);
+        for quad in &scene.quads {
+            let [a, b, c, d] = quad.corners;
+            let across = cross(sub(c, a), sub(d, b));
+            let outward = dot(across, quad.normals[0]);
+            assert!((0..4).all(|i| (norm(quad.normals[i]) - 1.0).abs() < 1e-5));
+            assert!(outward.abs() > 0.5 * norm(across), "normal along its face");
+        }
+        // Top faces of warps look up, bottom faces down.
+        for quad in scene.quads.iter().filter(|q| q.kind == Kind::Yarn && q.corners.iter().all(|c| c[2] > 0.35)) {
+            assert!(quad.normals.iter().all(|n| n[2] > 0.9));
+        }
+    }
+
+    #[test]
+    fn an_unknown_field_lists_the_known_ones() {
+        let mesh = sample::plies();
+        let mut frame = sample::frame(&mesh, [[1.0, 0.0], [0.0, 1.0]]);
+        frame.beam_fields.push(Field { name: "tension_n".into(), components: 1, values: vec![0.1; mesh.beams()] });
+        let message = build(&mesh, &frame, Some("tensoin")).unwrap_err().to_string();
+        assert!(message.contains("tensoin") && message.contains("tension_n"), "{message}");
+        assert_eq!(build(&mesh, &frame, Some("tension_n")).unwrap().legend, Some(("tension_n".into(), [0.1, 0.1])));
+    }
+}

@@ -1,0 +1,174 @@
+//! CSV tables with a fixed header, readable while the run goes on: every row is flushed.
+//!
+//! Numbers are written with the fewest digits that read back to the same f64; not-a-number as `NaN`.
+
+use crate::error::{Error, Result};
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Columns of `history.csv`.
+pub const HISTORY: &[&str] = &[
+    "time_s",
+    "step",
+    "phase",
+    "dt_s",
+    "shear_angle_deg",
+    "displacement_mm",
+    "force_n",
+    "f_nor_n_per_mm",
+    "e_internal_mj",
+    "e_kinetic_mj",
+    "e_balance_error",
+    "max_penetration_mm",
+    "min_jacobian",
+];
+
+/// Columns of `yarns.csv`: means over the stations of a ply, then their standard deviations.
+pub const YARNS: &[&str] = &[
+    "time_s",
+    "shear_angle_deg",
+    "warp_width_mm",
+    "warp_thickness_mm",
+    "warp_gap_mm",
+    "weft_width_mm",
+    "weft_thickness_mm",
+    "weft_gap_mm",
+    "warp_width_std_mm",
+    "warp_thickness_std_mm",
+    "warp_gap_std_mm",
+    "weft_width_std_mm",
+    "weft_thickness_std_mm",
+    "weft_gap_std_mm",
+];
+
+/// Columns of `stitches.csv`.
+pub const STITCHES: &[&str] = &[
+    "time_s",
+    "shear_angle_deg",
+    "tension_min_n",
+    "tension_mean_n",
+    "tension_max_n",
+    "slack_share",
+    "loop_tension_mean_n",
+    "loop_slack_share",
+    "underlap_tension_mean_n",
+    "underlap_slack_share",
+];
+
+/// One entry of a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Cell<'a> {
+    Number(f64),
+    /// A name; it must hold no comma, quote or line break.
+    Name(&'a str),
+}
+
+impl From<f64> for Cell<'_> {
+    fn from(value: f64) -> Self {
+        Cell::Number(value)
+    }
+}
+
+impl<'a> From<&'a str> for Cell<'a> {
+    fn from(value: &'a str) -> Self {
+        Cell::Name(value)
+    }
+}
+
+/// A table being written.
+#[derive(Debug)]
+pub struct Table {
+    path: PathBuf,
+    file: File,
+    columns: usize,
+    line: String,
+}
+
+impl Table {
+    /// Starts a table, replacing any old one.
+    pub fn create(path: &Path, header: &[&str]) -> Result<Self> {
+        let file = File::create(path).map_err(|e| Error::file(path, e))?;
+        let mut table = Self { path: path.to_path_buf(), file, columns: header.len(), line: String::new() };
+        let names: Vec<Cell> = header.iter().map(|&name| name.into()).collect();
+        table.row(&names)?;
+        Ok(table)
+    }
+
+    /// Writes a row: one cell a column.
+    pub fn row(&mut self, cells: &[Cell]) -> Result<()> {
+        if cells.len() != self.columns {
+            return Err(Error::file(&self.path, format!("{} cells for {} columns", cells.len(), self.columns)));
+        }
+        self.line.clear();
+        for (i, cell) in cells.iter().enumerate() {
+            if i > 0 {
+                self.line.push(',');
+            }
+            match cell {
+                Cell::Number(value) => push_number(&mut self.line, *value),
+                Cell::Name(name) if name.contains([',', '"', '\n', '\r']) => {
+                    return Err(Error::file(&self.path, format!("{name:?} cannot be a cell of a table")));
+                }
+                Cell::Name(name) => self.line.push_str(name),
+            }
+        }
+        self.line.push('\n');
+        // One write per row: a reader never sees half a row but when the disk is full.
+        self.file.write_all(self.line.as_bytes()).map_err(|e| Error::file(&self.path, e))
+    }
+
+    /// Writes a row of numbers.
+    pub fn numbers(&mut self, values: &[f64]) -> Result<()> {
+        let cells: Vec<Cell> = values.iter().map(|&v| v.into()).collect();
+        self.row(&cells)
+    }
+}
+
+fn push_number(line: &mut String, value: f64) {
+    // `Debug` is the shortest text that reads back, with an exponent where that is shorter; writing to a String cannot fail.
+    let _ = write!(line, "{value:?}");
+    if line.ends_with(".0") {
+        line.truncate(line.len() - 2);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_on_disk_at_once_and_read_back_exactly() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.csv");
+        let mut table = Table::create(&path, &["a_s", "b", "phase"]).unwrap();
+        let values = [1.0 / 3.0, -2.5e-19];
+        table.row(&[values[0].into(), values[1].into(), "shear".into()]).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[0], "a_s,b,phase");
+        let read: Vec<&str> = lines[1].split(',').collect();
+        assert_eq!([read[0].parse::<f64>().unwrap(), read[1].parse().unwrap()], values);
+        assert_eq!(read[2], "shear");
+        table.numbers(&[3.0, f64::NAN, 1e300]).unwrap();
+        assert!(std::fs::read_to_string(&path).unwrap().ends_with("3,NaN,1e300\n"));
+    }
+
+    #[test]
+    fn errors_name_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.csv");
+        let mut table = Table::create(&path, YARNS).unwrap();
+        assert!(table.numbers(&[1.0]).unwrap_err().to_string().contains("1 cells for 14 columns"));
+        assert!(Table::create(&path, &["a,b"]).unwrap_err().to_string().contains("t.csv"));
+        assert!(Table::create(&folder.path().join("none/t.csv"), HISTORY).unwrap_err().to_string().contains("none"));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_an_error() {
+        let message = Table::create(Path::new("/dev/full"), STITCHES).unwrap_err().to_string();
+        assert!(message.contains("/dev/full"), "{message}");
+    }
+}
