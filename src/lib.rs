@@ -1,5 +1,6 @@
 //! Explicit finite elements for dry stitched non-crimp fabrics at the scale of their yarns.
 
+pub mod backend;
 pub mod case;
 pub mod conditions;
 pub mod contact;

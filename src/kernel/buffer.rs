@@ -91,6 +91,16 @@ impl Array {
         &bytemuck::cast_slice(&self.lines)[..self.len * self.size]
     }
 
+    /// Replaces the bytes of all numbers.
+    pub fn set_bytes(&mut self, bytes: &[u8]) {
+        bytemuck::cast_slice_mut::<_, u8>(&mut self.lines)[..self.len * self.size].copy_from_slice(bytes);
+    }
+
+    /// Sets all numbers to zero.
+    pub fn clear(&mut self) {
+        self.lines.fill(CacheLine::zeroed());
+    }
+
     /// Address of the first number; the numbers stay where they are as long as the array lives.
     pub fn address(&mut self) -> *mut u8 {
         self.lines.as_mut_ptr().cast()

@@ -32,6 +32,27 @@ pub struct Row<R> {
     pub reserved: [R; 5],
 }
 
+impl Row<f64> {
+    /// The row in the precision of a run.
+    pub fn cast<R: Real>(&self) -> Row<R> {
+        let r = R::from_f64;
+        Row {
+            gradient: self.gradient.map(|row| row.map(r)),
+            rate: self.rate.map(|row| row.map(r)),
+            dt: r(self.dt),
+            dt_mid: r(self.dt_mid),
+            thermal: r(self.thermal),
+            thermal_increment: r(self.thermal_increment),
+            radius: r(self.radius),
+            radius_increment: r(self.radius_increment),
+            damping_solid: r(self.damping_solid),
+            damping_thread: r(self.damping_thread),
+            motion: r(self.motion),
+            reserved: self.reserved.map(r),
+        }
+    }
+}
+
 // SAFETY: `repr(C)`, one scalar type throughout, hence no padding.
 unsafe impl<R: Zeroable> Zeroable for Row<R> {}
 // SAFETY: as above, and every bit pattern of R is valid.

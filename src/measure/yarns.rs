@@ -8,7 +8,7 @@
 //! - thickness is the largest distance in z between the top and the bottom node of a column;
 //! - gap is the distance along n from the outermost node on the +n side to the facing edge of the next yarn of the same
 //!   ply. The edge of a yarn is the chain of its outermost nodes; periodic images up to two cells away count.
-//!   Negative: the two overlap in the plane. NaN: there is no next yarn;
+//!   Negative: the two overlap in the plane, by at most half the width. NaN: there is no next yarn;
 //! - broadness is width plus gap.
 //!
 //! Unsheared, an undeformed ply has the broadness p (its pitch); under trellis shear without slip p cos γ.

@@ -50,6 +50,12 @@ pub fn frame(mesh: &Mesh, gradient: [[f64; 2]; 2]) -> Frame {
     }
 }
 
+/// A mesh in trellis shear by an angle in rad.
+pub fn sheared(mesh: &Mesh, angle: f64) -> Frame {
+    let (s, c) = (0.5 * angle).sin_cos();
+    frame(mesh, [[c, s], [s, c]])
+}
+
 /// A closed straight yarn with a truncated elliptic section, 0.38 mm thick, centred at `place` across its ply.
 fn yarn(mesh: &mut Mesh, ply: Ply, place: f64, width: f64, columns: usize) {
     let (layers, half, axis) = (2, 0.19, width / (2.0 * 0.95));

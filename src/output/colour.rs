@@ -46,7 +46,7 @@ pub fn warp() -> Rgb {
 
 /// Colour of weft yarns: carbon, a step lighter and bluer.
 pub fn weft() -> Rgb {
-    oklch(0.60, 0.045, 235.0)
+    oklch(0.58, 0.042, 235.0)
 }
 
 /// Colour of blocks that belong to no ply.

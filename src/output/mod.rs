@@ -4,7 +4,7 @@
 //! - [`vtu`]: frames and their collection; [`table`]: CSV files;
 //! - [`picture`] renders a frame: [`scene`] turns it into triangles, [`raster`] draws those into a depth buffer and lights
 //!   them, [`image`] holds pixels, with letters from [`text`] and colours from [`colour`];
-//! - [`file`]: how a file is replaced as a whole or not at all.
+//! - [`mod@file`]: how a file is replaced as a whole or not at all.
 
 pub mod colour;
 pub mod directory;

@@ -8,6 +8,7 @@ use super::colour::{self, Rgb};
 use super::image::Image;
 use super::scene::{Kind, Quad, Scene, add, cross, dot, scale, sub, unit};
 use rayon::prelude::*;
+use std::sync::LazyLock;
 
 /// Where the scene is seen from.
 #[derive(Debug, Clone, Copy)]
@@ -68,7 +69,7 @@ pub fn draw(scene: &Scene, shifts: &[[f32; 3]], camera: &Camera, clip: &Clip) ->
                 let quad = &scene.quads[seen.quad as usize];
                 let surface = Surface::at(quad, shifts[usize::from(seen.shift)], seen.second, camera, [x, y]);
                 let (sky, sun) = (openness(&buffer, camera, x, y), sunlit(&buffer, camera, x, y));
-                *pixel = surface.lit(camera, sky, sun);
+                *pixel = surface.lit(camera, sky, sun, scene.legend.is_some());
             }
         }
     });
@@ -138,7 +139,7 @@ struct Surface {
     normal: [f32; 3],
     fibre: [f32; 3],
     colour: Rgb,
-    grain: [f32; 2],
+    grain: [f32; 3],
     kind: Kind,
     /// Seen from inside: part of a cut face.
     cut: bool,
@@ -161,60 +162,83 @@ impl Surface {
             normal,
             fibre: unit(sub(quad.corners[1], quad.corners[0])),
             colour: blend(&quad.colours),
-            grain: [0, 1].map(|i| (0..3).map(|k| w[k] * quad.grain[corners[k]][i]).sum()),
+            grain: blend(&quad.grain),
             kind: quad.kind,
             cut: dot(outward, camera.axes[2]) < 0.0,
         }
     }
 
-    /// Colour under the lights: `sky` and `sun` are the shares of them that arrive.
-    fn lit(&self, camera: &Camera, sky: f32, sun: f32) -> Rgb {
+    /// Colour under the lights: `sky` and `sun` are the shares of them that arrive; `calm` subdues patterns.
+    fn lit(&self, camera: &Camera, sky: f32, sun: f32, calm: bool) -> Rgb {
         let [right, up, toward] = camera.axes;
         let key = unit(add(add(scale(right, KEY[0]), scale(up, KEY[1])), scale(toward, KEY[2])));
         if self.cut {
             return scale(self.colour, 0.55 + 0.2 * sky);
         }
-        let facing = dot(self.normal, key).max(0.0);
+        let (texture, gloss, power, normal) = match self.kind {
+            Kind::Yarn => (filaments(self.grain), 0.16, 24, relief(self.normal, toward)),
+            Kind::Thread => (twist(self.grain), 0.10, 12, self.normal),
+        };
+        // Where colours are values, the pattern of the filaments stays in the background.
+        let (texture, gloss) = if calm { (1.0 + 0.3 * (texture - 1.0), 0.2 * gloss) } else { (texture, gloss) };
         let half = unit(add(key, toward));
         let along = dot(self.fibre, half);
-        let (texture, gloss, power) = match self.kind {
-            Kind::Yarn => (filaments(self.grain), 0.16, 24),
-            Kind::Thread => (twist(self.grain), 0.10, 12),
-        };
-        let sheen = gloss * (1.0 - along * along).max(0.0).powi(power) * dot(self.normal, half).max(0.0).powi(6);
-        let dome = 0.5 + 0.5 * dot(self.normal, toward);
-        let light = texture * (0.62 * sky * dome + 0.95 * sun * facing);
+        let sheen = gloss * (1.0 - along * along).max(0.0).powi(power) * dot(normal, half).max(0.0).powi(6);
+        let dome = 0.5 + 0.5 * dot(normal, toward);
+        let light = texture * (0.60 * sky * dome + 0.97 * sun * dot(normal, key).max(0.0));
         let shine = sheen * sun * texture * texture;
         self.colour.map(|c| c * light + shine * (0.25 + 0.75 * c))
     }
 }
 
-/// Brightness of the filaments of a tow: fine streaks along the fibre, at several widths.
-fn filaments([across, along]: [f32; 2]) -> f32 {
-    let streaks = |per_mm: f32, length: f32| noise(across * per_mm, along / length) - 0.5;
-    1.0 + 0.30 * streaks(9.0, 6.0) + 0.24 * streaks(23.0, 3.0) + 0.16 * streaks(3.0, 14.0)
+/// A normal whose tilt away from the viewer is exaggerated, as on relief maps: yarns are ten times wider than thick.
+fn relief(normal: [f32; 3], toward: [f32; 3]) -> [f32; 3] {
+    const TILT: f32 = 1.9;
+    unit(add(scale(normal, TILT), scale(toward, (1.0 - TILT) * dot(normal, toward))))
+}
+
+/// Brightness of the filaments of a tow: fine streaks along the fibre, at several widths. It repeats with the length, so
+/// that no seam shows where a yarn closes on itself.
+fn filaments([across, along, length]: [f32; 3]) -> f32 {
+    let streaks = |per_mm: f32, long: f32| {
+        let cells = (length / long).round().max(1.0);
+        noise(across * per_mm, along * cells, cells as i32) - 0.5
+    };
+    1.0 + 0.30 * streaks(9.0, 5.0) + 0.24 * streaks(23.0, 2.5) + 0.16 * streaks(3.0, 5.0)
 }
 
 /// Brightness of a twisted thread: two plies winding around it.
-fn twist([around, along]: [f32; 2]) -> f32 {
-    0.92 + 0.13 * (std::f32::consts::TAU * (2.0 * around + along)).sin()
+fn twist([around, along, turns]: [f32; 3]) -> f32 {
+    0.92 + 0.13 * (std::f32::consts::TAU * (2.0 * around + along * turns)).sin()
 }
 
-/// Smooth noise, 0 to 1.
-fn noise(x: f32, y: f32) -> f32 {
-    let value = |i: i32, j: i32| {
-        let mut h = (i as u32).wrapping_mul(0x9e37_79b1) ^ (j as u32).wrapping_mul(0x85eb_ca77);
-        h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
-        h = (h ^ (h >> 12)).wrapping_mul(0x297a_2d39);
-        (h ^ (h >> 15)) as f32 / u32::MAX as f32
-    };
+/// Smooth noise, 0 to 1, that repeats in y after a whole number of cells.
+fn noise(x: f32, y: f32, cells: i32) -> f32 {
     let smooth = |t: f32| t * t * (3.0 - 2.0 * t);
     let (i, j) = (x.floor(), y.floor());
     let (u, v) = (smooth(x - i), smooth(y - j));
     let (i, j) = (i as i32, j as i32);
+    let value = |i: i32, j: i32| chance(i, j.rem_euclid(cells)) as f32 / u32::MAX as f32;
     let row = |j: i32| value(i, j) + u * (value(i + 1, j) - value(i, j));
     row(j) + v * (row(j + 1) - row(j))
 }
+
+/// Bits without pattern for a pair of numbers.
+fn chance(i: i32, j: i32) -> u32 {
+    let mut h = (i as u32).wrapping_mul(0x9e37_79b1) ^ (j as u32).wrapping_mul(0x85eb_ca77);
+    h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
+    h = (h ^ (h >> 12)).wrapping_mul(0x297a_2d39);
+    h ^ (h >> 15)
+}
+
+/// Unit vectors in [`TURNS`] directions.
+static COMPASS: LazyLock<[[f32; 2]; TURNS]> = LazyLock::new(|| {
+    std::array::from_fn(|i| {
+        let (s, c) = (std::f32::consts::TAU * i as f32 / TURNS as f32).sin_cos();
+        [c, s]
+    })
+});
+const TURNS: usize = 64;
 
 /// Share of the sky that is seen from a pixel: less where surfaces nearby are higher.
 fn openness(buffer: &[Fragment], camera: &Camera, x: usize, y: usize) -> f32 {
@@ -222,10 +246,9 @@ fn openness(buffer: &[Fragment], camera: &Camera, x: usize, y: usize) -> f32 {
     const RADII: [f32; 3] = [0.07, 0.18, 0.42];
     let own = buffer[y * camera.width + x].depth;
     // Turned from pixel to pixel, so that the few directions do not show.
-    let start = noise(x as f32 * 1.7 + 0.5, y as f32 * 2.3 + 0.5);
+    let start = chance(x as i32, y as i32) as usize % (TURNS / DIRECTIONS);
     let mut hidden = 0.0;
-    for d in 0..DIRECTIONS {
-        let (s, c) = (std::f32::consts::TAU * (d as f32 + start) / DIRECTIONS as f32).sin_cos();
+    for [c, s] in COMPASS.iter().skip(start).step_by(TURNS / DIRECTIONS) {
         let steepest = RADII.iter().fold(0.0_f32, |steepest, radius| {
             let rise =
                 depth(buffer, camera, x as f32 + c * radius * camera.scale, y as f32 + s * radius * camera.scale) - own;
@@ -242,7 +265,7 @@ fn sunlit(buffer: &[Fragment], camera: &Camera, x: usize, y: usize) -> f32 {
     const LENGTH: f32 = 0.9;
     let own = buffer[y * camera.width + x].depth;
     let flat = KEY[0].hypot(KEY[1]);
-    let jitter = noise(x as f32 * 2.9 + 0.5, y as f32 * 1.3 + 0.5);
+    let jitter = chance(y as i32, x as i32) as f32 / u32::MAX as f32;
     let mut blocked = 0.0_f32;
     for k in 0..STEPS {
         let run = LENGTH * (k as f32 + 0.3 + 0.7 * jitter) / STEPS as f32;
@@ -269,7 +292,7 @@ mod tests {
             corners: [[0.0, 0.0, z], [4.0, 0.0, z], [4.0, 4.0, z], [0.0, 4.0, z]],
             normals: [[0.0, 0.0, 1.0]; 4],
             colours: [colour; 4],
-            grain: [[0.0; 2]; 4],
+            grain: [[0.0, 0.0, 1.0]; 4],
             kind: Kind::Yarn,
         }
     }

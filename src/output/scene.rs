@@ -31,8 +31,9 @@ pub struct Quad {
     /// Outward, unit length.
     pub normals: [[f32; 3]; 4],
     pub colours: [Rgb; 4],
-    /// Coordinates of the filament pattern at each corner: across and along the fibre.
-    pub grain: [[f32; 2]; 4],
+    /// Coordinates of the filament pattern at each corner: across the fibre (yarns: mm, threads: turns), along it (share of
+    /// the length), and the length (yarns: mm, threads: whole turns of the twist).
+    pub grain: [[f32; 3]; 4],
     pub kind: Kind,
 }
 
@@ -59,7 +60,7 @@ impl Paint<'_> {
 
     fn colour(&self, value: f64) -> Rgb {
         let [low, high] = self.range;
-        colour::map(if high > low { ((value - low) / (high - low)) as f32 } else { value as f32 * 0.0 + 0.5 })
+        colour::map(if high > low { ((value - low) / (high - low)) as f32 } else { 0.5 })
     }
 }
 
@@ -142,11 +143,11 @@ fn surfaces(
             if flip { n.map(|v| -v) } else { n }
         };
         let offset = 17.3 * (index * 8 + face) as f32;
+        let width = norm(sub(position([0, columns, 0]), position([0, 0, 0])));
+        let length = norm(sub(position([slices, 0, 0]), position([0, 0, 0])));
         let grain = |i: usize, j: usize| {
             let [s, c, l] = place(i, j, at).map(|v| v as f32);
-            let width = norm(sub(position([0, columns, 0]), position([0, 0, 0])));
-            let length = norm(sub(position([slices, 0, 0]), position([0, 0, 0])));
-            [offset + c / columns as f32 * width + 0.2 * l, s / slices as f32 * length]
+            [offset + c / columns as f32 * width + 0.2 * l, s / slices as f32, length]
         };
         for i in 0..rows {
             for j in 0..across {
@@ -176,6 +177,9 @@ fn surfaces(
 /// A round tube along a thread whose first beam has the number `first`.
 fn tube(quads: &mut Vec<Quad>, mesh: &Mesh, frame: &Frame, thread: &Thread, first: usize, paint: Option<&Paint>) {
     let beams = thread.beams();
+    if beams == 0 {
+        return;
+    }
     let mut points: Vec<[f32; 3]> =
         (0..beams).map(|i| frame.position(mesh, thread.beam(i)[0]).map(|v| v as f32)).collect();
     points.push(frame.position(mesh, thread.beam(beams - 1)[1]).map(|v| v as f32));
@@ -229,7 +233,7 @@ fn tube(quads: &mut Vec<Quad>, mesh: &Mesh, frame: &Frame, thread: &Thread, firs
                 corners: ends.map(|e| add(curve[k + e[0]].0, scale(radial(e), radius))),
                 normals: ends.map(radial),
                 colours: ends.map(|e| colour(e[0])),
-                grain: ends.map(|[end, n]| [n as f32 / SIDES as f32, rings[k + end].1 / TWIST]),
+                grain: ends.map(|[end, n]| [n as f32 / SIDES as f32, rings[k + end].1 / run, (run / TWIST).round()]),
                 kind: Kind::Thread,
             });
         }

@@ -295,7 +295,6 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::shear::trellis;
     use crate::mesh::sample;
     use std::io::Read;
 
@@ -343,7 +342,7 @@ mod tests {
     #[test]
     fn a_sheared_cell_reads_back_with_valid_cells() {
         let mesh = sample::plies();
-        let mut frame = sample::frame(&mesh, trellis(0.6));
+        let mut frame = sample::sheared(&mesh, 0.6);
         let (hexes, beams) = (mesh.hexes(), mesh.beams());
         frame.node_fields.push(field("speed", 1, (0..mesh.nodes.len()).map(|i| i as f64).collect()));
         frame.hex_fields.push(field("energy", 1, vec![2.0; hexes]));

@@ -301,7 +301,9 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let mut writes = vec![(acceleration, own(3, 1)), (inverse_mass, own(1, 1))];
     let mut added_mass = None;
     let assembly = match &contact {
-        None => after::<assemble::Assemble<false, false>>("assemble", nodes, NODE_GRAIN, &reads, &writes, assemble_params),
+        None => {
+            after::<assemble::Assemble<false, false>>("assemble", nodes, NODE_GRAIN, &reads, &writes, assemble_params)
+        }
         Some(contact) => {
             writes.push((contact.force, own(3, 1)));
             if contact_mass.is_some() {
@@ -310,7 +312,14 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
                 writes.extend([(contact.stiffness, own(1, 1)), (added, own(1, 1))]);
                 after::<assemble::Assemble<true, true>>("assemble", nodes, NODE_GRAIN, &reads, &writes, assemble_params)
             } else {
-                after::<assemble::Assemble<true, false>>("assemble", nodes, NODE_GRAIN, &reads, &writes, assemble_params)
+                after::<assemble::Assemble<true, false>>(
+                    "assemble",
+                    nodes,
+                    NODE_GRAIN,
+                    &reads,
+                    &writes,
+                    assemble_params,
+                )
             }
         }
     };
@@ -357,19 +366,23 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
 
     // motion
     let gravity = effects.gravity_mm_s2;
-    let params = integrate::Params {
-        first_thread,
-        unused: 0,
-        gravity: gravity.unwrap_or_default().map(|g| g as f32),
-    };
+    let params = integrate::Params { first_thread, unused: 0, gravity: gravity.unwrap_or_default().map(|g| g as f32) };
     let reads = [acceleration, mass, correction, inverse_mass];
     let writes = [(velocity, own(3, 1)), (quanta_, own(3, 1)), (remainder, own(3, 1)), (work, own(3, 1))];
     let lines = effects.fibre_lines.is_some();
     b.plan.step.push(match (lines, gravity.is_some()) {
-        (true, true) => after::<integrate::Integrate<true, true>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params),
-        (true, false) => after::<integrate::Integrate<true, false>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params),
-        (false, true) => after::<integrate::Integrate<false, true>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params),
-        (false, false) => after::<integrate::Integrate<false, false>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params),
+        (true, true) => {
+            after::<integrate::Integrate<true, true>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params)
+        }
+        (true, false) => {
+            after::<integrate::Integrate<true, false>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params)
+        }
+        (false, true) => {
+            after::<integrate::Integrate<false, true>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params)
+        }
+        (false, false) => {
+            after::<integrate::Integrate<false, false>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params)
+        }
     });
 
     // limit of the time step
@@ -527,7 +540,8 @@ impl ContactScene<'_> {
             let keys_len = penalty::SLOT_KEYS * slots * count;
             let keys =
                 b.add("contact candidates", Kind::Uint, keys_len, true, Initial::Uint(vec![contact::EMPTY; keys_len]));
-            let state = b.add("contact friction", Kind::Scalar, penalty::SLOT_STATE * slots * count, true, Initial::Zero);
+            let state =
+                b.add("contact friction", Kind::Scalar, penalty::SLOT_STATE * slots * count, true, Initial::Zero);
             let sums = b.scratch("contact sums", penalty::SUMS * count);
             let keys_own = (keys, own(1, penalty::SLOT_KEYS * slots));
             let state_own = (state, own(1, penalty::SLOT_STATE * slots));
@@ -553,7 +567,8 @@ impl ContactScene<'_> {
             let arcs = b.table("arc lengths", self.threads.arcs.clone());
             let keys_len = slots * beams;
             let keys = b.add("beam pairs", Kind::Uint, keys_len, true, Initial::Uint(vec![contact::EMPTY; keys_len]));
-            let state = b.add("beam pair friction", Kind::Scalar, thread_contact::STATE * slots * beams, true, Initial::Zero);
+            let state =
+                b.add("beam pair friction", Kind::Scalar, thread_contact::STATE * slots * beams, true, Initial::Zero);
             let sums = b.scratch("beam pair sums", penalty::SUMS * beams);
             let common = [&[of, arcs, self.ends, self.beams][..], &place].concat();
             let reads = [&common[..], &[counts, lists, boxes]].concat();
@@ -712,9 +727,10 @@ fn constant_stiffness(mesh: &Mesh, threads: &Threads, axial: &[f64], covered: &[
     let first = mesh.first_thread_node();
     let mut k = vec![0.0; mesh.nodes.len()];
     k[first..].copy_from_slice(&threads.bending_stiffness);
-    let blocks = mesh.blocks.iter().flat_map(|b| {
-        (0..b.lines()).map(move |l| (b.first + l * b.stations(), b.stations(), b.wrap.is_some()))
-    });
+    let blocks = mesh
+        .blocks
+        .iter()
+        .flat_map(|b| (0..b.lines()).map(move |l| (b.first + l * b.stations(), b.stations(), b.wrap.is_some())));
     let chains = mesh.threads.iter().map(|t| (t.first, t.count, t.wrap.is_some()));
     for (first, count, closed) in blocks.chain(chains) {
         for i in 0..count {
@@ -751,7 +767,8 @@ fn conditions(case: &Case, mesh: &Mesh) -> Result<(Vec<u32>, Vec<f64>)> {
                             format!("domain.mesh.conditions.{number}"),
                             format!(
                                 "prescribes {displacement} mm along {} at node {node}, which an earlier condition moves by {} mm; keep one of them",
-                                ["x", "y", "z"][k], target[k]
+                                ["x", "y", "z"][k],
+                                target[k]
                             ),
                         ));
                     }

@@ -132,8 +132,7 @@ impl Solids {
         let mut points = Vec::with_capacity(hexes.len());
         for (l, hex) in hexes.iter().enumerate() {
             let block = &mesh.blocks[hex.block];
-            let element = points_of(&edges(hex), frame)
-                .map_err(|volume| upside_down(mesh, block, hex, volume))?;
+            let element = points_of(&edges(hex), frame).map_err(|volume| upside_down(mesh, block, hex, volume))?;
             self.lump(block, hex, &element);
             self.place[hex.index] = (number, l);
             for (corner, seen) in hex.corners.iter().enumerate() {
@@ -160,7 +159,8 @@ impl Solids {
             }
             shape as u32
         });
-        let ids: Vec<u32> = (0..8).flat_map(|c| (0..LANES).map(move |l| (c, l))).map(|(c, l)| lane(l).corners[c].node as u32).collect();
+        let ids: Vec<u32> =
+            (0..8).flat_map(|c| (0..LANES).map(move |l| (c, l))).map(|(c, l)| lane(l).corners[c].node as u32).collect();
         let contiguous = ids.chunks(LANES).all(|c| c.windows(2).all(|w| w[1] == w[0] + 1));
         self.corners.extend(ids);
         self.headers.push(Header {
@@ -207,9 +207,8 @@ fn put(table: &mut [u32], node: usize, slot: usize) {
 
 /// Orthonormal frame with the fibre as first axis and the second in the plane of the fabric: `frame[i][j]` is component i of axis j.
 fn frame(fibre: [f64; 3]) -> [[f64; 3]; 3] {
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let unit = |a: [f64; 3]| {
         let l = libm::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
         a.map(|x| x / l)
@@ -260,6 +259,8 @@ fn upside_down(mesh: &Mesh, block: &Block, hex: &Hex, volume: f64) -> Error {
     let [x, y, z] = mesh.position(hex.corners[0]);
     Error::geometry(
         format!("{}, hexahedron {}", block.name, hex.index),
-        format!("has the Jacobian {volume:.3e} mm³ at ({x:.3}, {y:.3}, {z:.3}); it must be positive: check the order of its nodes"),
+        format!(
+            "has the Jacobian {volume:.3e} mm³ at ({x:.3}, {y:.3}, {z:.3}); it must be positive: check the order of its nodes"
+        ),
     )
 }

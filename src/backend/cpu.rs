@@ -1,0 +1,193 @@
+//! The CPU backend: stages split into fixed chunks that rayon spreads over threads.
+//!
+//! Stages that do not wait for each other run as one parallel loop. Chunks write disjoint memory or add integers, so the
+//! result does not depend on how many threads there are or which of them takes a chunk.
+
+use super::Backend;
+use crate::kernel::buffer::{Array, Buffer, Description};
+use crate::kernel::lane::{Isa, Real};
+use crate::kernel::row::Row;
+use crate::kernel::stage::{Access, Binding, CpuKernel, Io, Stage};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+/// Buffers in host memory, and threads to work on them.
+pub struct Cpu<R: Real> {
+    arrays: Vec<Array>,
+    isa: Isa,
+    pool: Option<rayon::ThreadPool>,
+    threads: usize,
+    /// Name and nanoseconds of each stage, summed over threads.
+    spent: Vec<(&'static str, AtomicU64)>,
+    precision: std::marker::PhantomData<R>,
+}
+
+/// A precision that the CPU can run: which of a kernel's functions it is.
+pub trait Precision: Real {
+    fn function(kernel: &CpuKernel) -> fn(&Io<Self>, std::ops::Range<usize>);
+    const NAME: &'static str;
+}
+
+impl Precision for f32 {
+    const NAME: &'static str = "f32";
+    fn function(kernel: &CpuKernel) -> fn(&Io<f32>, std::ops::Range<usize>) {
+        kernel.f32
+    }
+}
+
+impl Precision for f64 {
+    const NAME: &'static str = "f64";
+    fn function(kernel: &CpuKernel) -> fn(&Io<f64>, std::ops::Range<usize>) {
+        kernel.f64
+    }
+}
+
+impl<R: Precision> Cpu<R> {
+    /// Buffers as described, on `threads` threads (0 for all cores) with instruction set `isa`.
+    pub fn new(buffers: &[Description], threads: usize, isa: Isa) -> Self {
+        let threads = if threads > 0 { threads } else { std::thread::available_parallelism().map_or(1, |n| n.get()) };
+        let pool = (threads > 1).then(|| {
+            rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads of the CPU backend start")
+        });
+        Self {
+            arrays: buffers.iter().map(Array::new::<R>).collect(),
+            isa,
+            pool,
+            threads,
+            spent: Vec::new(),
+            precision: std::marker::PhantomData,
+        }
+    }
+
+    /// Runs groups of stages that do not wait for each other.
+    fn run_groups(groups: &[Group<R>], rows: &[Row<R>], parallel: bool) {
+        for row in rows {
+            for group in groups {
+                let work = |chunk: &Chunk| group.run(chunk, row);
+                if parallel && group.chunks.len() > 1 {
+                    group.chunks.par_iter().with_max_len(1).for_each(work);
+                } else {
+                    group.chunks.iter().for_each(work);
+                }
+            }
+        }
+    }
+}
+
+/// Stages that may run at the same time, cut into chunks.
+struct Group<'a, R: Real> {
+    stages: Vec<Bound<'a, R>>,
+    chunks: Vec<Chunk>,
+}
+
+/// A stage with its buffers bound.
+struct Bound<'a, R: Real> {
+    bindings: Vec<Binding>,
+    params: &'a [u8],
+    function: fn(&Io<R>, std::ops::Range<usize>),
+    isa: Isa,
+    spent: &'a AtomicU64,
+}
+
+// SAFETY: bindings are addresses of arrays that outlive the run; `Access` keeps chunks apart.
+unsafe impl<R: Real> Sync for Bound<'_, R> {}
+
+/// Some items of a stage of a group.
+struct Chunk {
+    stage: usize,
+    items: std::ops::Range<usize>,
+}
+
+impl<R: Real> Group<'_, R> {
+    fn run(&self, chunk: &Chunk, row: &Row<R>) {
+        let stage = &self.stages[chunk.stage];
+        let started = Instant::now();
+        let io =
+            Io { bindings: &stage.bindings, row, params: stage.params, isa: stage.isa, items: chunk.items.clone() };
+        (stage.function)(&io, chunk.items.clone());
+        stage.spent.fetch_add(started.elapsed().as_nanos() as u64, Ordering::Relaxed);
+    }
+}
+
+impl<R: Precision> Backend for Cpu<R> {
+    fn run(&mut self, stages: &[Stage], rows: &[Row<f64>]) {
+        let rows: Vec<Row<R>> = rows.iter().map(Row::cast).collect();
+        for stage in stages {
+            if !self.spent.iter().any(|(name, _)| *name == stage.name) {
+                self.spent.push((stage.name, AtomicU64::new(0)));
+            }
+        }
+        let addresses: Vec<(*mut u8, usize)> = self.arrays.iter_mut().map(|a| (a.address(), a.len())).collect();
+        let bind = |buffer: Buffer, access: Option<Access>| {
+            let (address, len) = addresses[buffer.0];
+            Binding { address, len, access }
+        };
+        let mut groups: Vec<Group<R>> = Vec::new();
+        for stage in stages.iter().filter(|stage| stage.count > 0) {
+            if stage.waits || groups.is_empty() {
+                groups.push(Group { stages: Vec::new(), chunks: Vec::new() });
+            }
+            let group = groups.last_mut().expect("just pushed");
+            let reads = stage.reads.iter().map(|b| bind(*b, None));
+            let writes = stage.writes.iter().map(|(b, access)| bind(*b, Some(*access)));
+            let spent = self.spent.iter().find(|(name, _)| *name == stage.name).map(|(_, spent)| spent);
+            group.stages.push(Bound {
+                bindings: reads.chain(writes).collect(),
+                params: &stage.params,
+                function: R::function(&stage.kernel),
+                isa: self.isa,
+                spent: spent.expect("every stage has a timer"),
+            });
+            let number = group.stages.len() - 1;
+            group.chunks.extend(
+                (0..stage.count)
+                    .step_by(stage.grain)
+                    .map(|first| Chunk { stage: number, items: first..(first + stage.grain).min(stage.count) }),
+            );
+        }
+        match &self.pool {
+            Some(pool) => pool.install(|| Self::run_groups(&groups, &rows, true)),
+            None => Self::run_groups(&groups, &rows, false),
+        }
+    }
+
+    fn scalars(&self, buffer: Buffer) -> Vec<f64> {
+        self.arrays[buffer.0].slice::<R>().iter().map(|x| x.to_f64()).collect()
+    }
+
+    fn ints(&self, buffer: Buffer) -> Vec<i32> {
+        self.arrays[buffer.0].slice::<i32>().to_vec()
+    }
+
+    fn uints(&self, buffer: Buffer) -> Vec<u32> {
+        self.arrays[buffer.0].slice::<u32>().to_vec()
+    }
+
+    fn set_scalars(&mut self, buffer: Buffer, values: &[f64]) {
+        for (to, from) in self.arrays[buffer.0].slice_mut::<R>().iter_mut().zip(values) {
+            *to = R::from_f64(*from);
+        }
+    }
+
+    fn clear(&mut self, buffer: Buffer) {
+        self.arrays[buffer.0].clear();
+    }
+
+    fn bytes(&self, buffer: Buffer) -> Vec<u8> {
+        self.arrays[buffer.0].bytes().to_vec()
+    }
+
+    fn set_bytes(&mut self, buffer: Buffer, bytes: &[u8]) {
+        self.arrays[buffer.0].set_bytes(bytes);
+    }
+
+    fn timings(&self) -> Vec<(&'static str, f64)> {
+        let threads = self.threads as f64;
+        self.spent.iter().map(|(name, ns)| (*name, ns.load(Ordering::Relaxed) as f64 * 1e-9 / threads)).collect()
+    }
+
+    fn describe(&self) -> String {
+        format!("cpu, {} thread{}, {:?}, {}", self.threads, if self.threads == 1 { "" } else { "s" }, self.isa, R::NAME)
+    }
+}
