@@ -15,3 +15,5 @@ pub mod mesh;
 pub mod output;
 pub mod plan;
 pub mod run;
+pub mod schedule;
+pub mod simulate;

@@ -1,10 +1,25 @@
-//! Case in, results out.
+//! Case in, results out: owns the plan, the backend, the schedule, the measures and the outputs of one run.
 
+use crate::case::domain::Domain;
 use crate::case::read::Loaded;
-use crate::case::steps::Precision;
+use crate::case::steps::{Precision, Step};
 use crate::error::{Error, Result};
-use std::fmt;
+use crate::fabric;
+use crate::measure::{shear, stitches, yarns};
+use crate::mesh::frame::Frame;
+use crate::mesh::{Mesh, Ply, export, report};
+use crate::output::picture::{View, render};
+use crate::output::table::{HISTORY, STITCHES, Table, YARNS};
+use crate::output::{directory, file, vtu};
+use crate::plan::{self, Capacity};
+use crate::simulate::{Make, Simulation};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 /// What the command line says about a run, beyond the case.
 #[derive(Debug, Clone)]
@@ -36,26 +51,538 @@ impl fmt::Display for Outcome {
     }
 }
 
+/// The mesh of a case and its friction coefficient.
+fn scene(loaded: &Loaded) -> Result<(Mesh, f64)> {
+    let mesh = fabric::build(&loaded.case, loaded.fabric.as_ref())?;
+    let friction = match (&loaded.fabric, &loaded.case.domain) {
+        (Some(fabric), _) => fabric.friction,
+        (None, Domain::Mesh(inline)) => inline.friction,
+        (None, _) => 0.0,
+    };
+    Ok((mesh, friction))
+}
+
+/// Prepares a case for running, without files.
+pub fn simulation(loaded: &Loaded, make: Make) -> Result<Simulation> {
+    let (mesh, friction) = scene(loaded)?;
+    Simulation::new(&loaded.case, friction, mesh, make)
+}
+
 /// Runs a case.
-pub fn run(_case: &Loaded, _options: &Options) -> Result<Outcome> {
-    Err(missing("run"))
+///
+/// # Errors
+/// Bad input, a folder that cannot be used, or a guard that stopped the run; what was computed by then stays on disk.
+pub fn run(loaded: &Loaded, options: &Options) -> Result<Outcome> {
+    let make = Make {
+        precision: options.precision.unwrap_or(loaded.case.integration.precision),
+        threads: options.threads.unwrap_or(0),
+        ..Make::default()
+    };
+    let simulation = simulation(loaded, make)?;
+    directory::prepare(&options.output, options.force)?;
+    let stopped = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stopped);
+    // a second run in one process keeps the first handler, which is as good
+    let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
+    let mut run = Run::new(loaded, options, simulation, stopped)?;
+    let result = run.go();
+    run.finish(result)
 }
 
-/// Writes the mesh of a case to a folder.
-pub fn mesh(_case: &Loaded, _dir: &Path) -> Result<String> {
-    Err(missing("mesh"))
+/// One run with its files.
+struct Run<'a> {
+    loaded: &'a Loaded,
+    options: &'a Options,
+    simulation: Simulation,
+    stopped: Arc<AtomicBool>,
+    history: Table,
+    energies: Table,
+    stress: Table,
+    yarns: Option<Table>,
+    stitches: Option<Table>,
+    frames: Vec<(f64, String)>,
+    pictures: Vec<PathBuf>,
+    curve: Vec<(f64, f64)>,
+    settled: Option<yarns::Sizes>,
+    settled_weft: Option<yarns::Sizes>,
+    worst_balance: f64,
+    worst_kinetic: f64,
+    largest_added: [f64; 2],
+    dt_range: [f64; 2],
+    started: Instant,
 }
 
-/// Sizes and cost of a case; with `explain` every stage of its plan.
-pub fn check(_case: &Loaded, _explain: bool) -> Result<String> {
-    Err(missing("check"))
+/// Angle after which the kinetic energy of shear is judged, degrees.
+const SETTLED_DEG: f64 = 2.0;
+/// Components of V P̄/V₀ in `stress.csv`.
+const STRESS: [&str; 11] = [
+    "time_s",
+    "shear_angle_deg",
+    "p_xx_n_per_mm",
+    "p_xy_n_per_mm",
+    "p_xz_n_per_mm",
+    "p_yx_n_per_mm",
+    "p_yy_n_per_mm",
+    "p_yz_n_per_mm",
+    "p_zx_n_per_mm",
+    "p_zy_n_per_mm",
+    "p_zz_n_per_mm",
+];
+
+impl<'a> Run<'a> {
+    fn new(loaded: &'a Loaded, options: &'a Options, simulation: Simulation, stopped: Arc<AtomicBool>) -> Result<Self> {
+        let dir = &options.output;
+        let energies: Vec<&str> = ["time_s", "shear_angle_deg"]
+            .into_iter()
+            .chain(simulation.energies().columns().map(|(name, _)| name))
+            .collect();
+        let mesh = &simulation.mesh;
+        let plies = mesh.blocks.iter().any(|b| b.ply == Ply::Warp) && mesh.blocks.iter().any(|b| b.ply == Ply::Weft);
+        let threads = !mesh.threads.is_empty();
+        let folder = dir.join("frames");
+        std::fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, e))?;
+        Ok(Self {
+            loaded,
+            options,
+            history: Table::create(&dir.join("history.csv"), HISTORY)?,
+            energies: Table::create(&dir.join("energies.csv"), &energies)?,
+            stress: Table::create(&dir.join("stress.csv"), &STRESS)?,
+            yarns: if plies { Some(Table::create(&dir.join("yarns.csv"), YARNS)?) } else { None },
+            stitches: if threads { Some(Table::create(&dir.join("stitches.csv"), STITCHES)?) } else { None },
+            simulation,
+            stopped,
+            frames: Vec::new(),
+            pictures: Vec::new(),
+            curve: Vec::new(),
+            settled: None,
+            settled_weft: None,
+            worst_balance: 0.0,
+            worst_kinetic: 0.0,
+            largest_added: [0.0; 2],
+            dt_range: [f64::INFINITY, 0.0],
+            started: Instant::now(),
+        })
+    }
+
+    /// All load steps.
+    fn go(&mut self) -> Result<()> {
+        let output = &self.loaded.case.output;
+        let phases = self.simulation.schedule.phases().to_vec();
+        let bar = self.bar();
+        self.simulation.advance(0.0, |_| false)?;
+        self.write_frame("start")?;
+        for (number, (phase, step)) in phases.iter().zip(&self.loaded.case.steps).enumerate() {
+            let mut angles = match step {
+                Step::Shear { .. } => output.frames_at_deg.clone(),
+                _ => Vec::new(),
+            };
+            angles.sort_by(f64::total_cmp);
+            let before = self.simulation.load().angle.to_degrees();
+            angles.retain(|a| {
+                *a > before.abs() && *a < self.simulation.schedule.load(phase.end).angle.to_degrees().abs()
+            });
+            let rows = output.rows_per_step.max(1);
+            for row in 1..=rows {
+                let until = phase.start + (phase.end - phase.start) * row as f64 / rows as f64;
+                let stopped = Arc::clone(&self.stopped);
+                self.simulation.advance(until, |_| stopped.load(Ordering::Relaxed))?;
+                self.write_row(phase.name)?;
+                self.tell(&bar, phase.name);
+                let angle = self.simulation.load().angle.to_degrees().abs();
+                while angles.first().is_some_and(|a| angle >= *a) {
+                    let name = format!("{:.0}deg", angles.remove(0));
+                    self.write_frame(&name)?;
+                }
+                if output.frames_per_step > 0
+                    && row < rows
+                    && row * output.frames_per_step / rows != (row - 1) * output.frames_per_step / rows
+                {
+                    self.write_frame(&format!("{}-{}-{row}", number + 1, phase.name))?;
+                }
+                if self.stopped.load(Ordering::Relaxed) {
+                    bar.finish_and_clear();
+                    return self.write_frame("interrupted");
+                }
+            }
+            if !matches!(step, Step::Shear { .. } | Step::Move { .. }) && self.yarns.is_some() {
+                let yarns = yarns::measure(&self.simulation.mesh, &self.simulation.frame())?;
+                self.settled = Some(yarns::ply(&yarns, Ply::Warp));
+                self.settled_weft = Some(yarns::ply(&yarns, Ply::Weft));
+            }
+            self.write_frame(&format!("{}-{}", number + 1, phase.name))?;
+        }
+        bar.finish_and_clear();
+        Ok(())
+    }
+
+    fn bar(&self) -> ProgressBar {
+        if self.options.quiet {
+            return ProgressBar::hidden();
+        }
+        let style = ProgressStyle::with_template("{bar:24} {percent:>3}% {elapsed}/{duration} {msg}");
+        ProgressBar::new(1_000_000).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+    }
+
+    fn tell(&self, bar: &ProgressBar, phase: &str) {
+        let s = &self.simulation;
+        let e = s.energies();
+        bar.set_position((s.time() / s.schedule.end() * 1e6) as u64);
+        bar.set_message(format!(
+            "{phase} γ {:.1}° step {} dt {:.2e} s, internal {:.3e} mJ, kinetic {:.1e} mJ, balance {:+.2} %",
+            s.load().angle.to_degrees(),
+            s.step(),
+            s.dt(),
+            e.internal(),
+            e.kinetic,
+            100.0 * s.health().balance
+        ));
+    }
+
+    /// One row in every table.
+    fn write_row(&mut self, phase: &str) -> Result<()> {
+        let s = &mut self.simulation;
+        let stress = s.take_stress().unwrap_or_default();
+        let angle = s.load().angle;
+        let (time, degrees) = (s.time(), angle.to_degrees());
+        let area = s.mesh.period.map_or(f64::NAN, |[x, y]| x * y);
+        let plane = [[stress[0][0], stress[0][1]], [stress[1][0], stress[1][1]]];
+        let force = if s.mesh.period.is_some() { shear::normalised_force(plane, angle, area) } else { f64::NAN };
+        let reaction = s.reactions().iter().fold([0.0; 3], |sum, f| [0, 1, 2].map(|k| sum[k] + f[k]));
+        let reaction = libm::sqrt(reaction.iter().map(|f| f * f).sum());
+        let (e, h) = (*s.energies(), *s.health());
+        let motion = s.load().motion;
+        self.worst_balance = self.worst_balance.max(h.balance.abs());
+        self.dt_range = [self.dt_range[0].min(s.dt()), self.dt_range[1].max(s.dt())];
+        for (largest, now) in self.largest_added.iter_mut().zip(h.added_mass) {
+            *largest = largest.max(now);
+        }
+        if phase == "shear" {
+            self.curve.push((degrees, force));
+            if degrees.abs() > SETTLED_DEG {
+                self.worst_kinetic = self.worst_kinetic.max(e.kinetic_total / e.internal());
+            }
+        }
+        let penetration = h.penetration.into_iter().fold(0.0, f64::max);
+        self.history.row(&[
+            time.into(),
+            (s.step() as f64).into(),
+            phase.into(),
+            s.dt().into(),
+            degrees.into(),
+            motion.into(),
+            reaction.into(),
+            force.into(),
+            e.internal().into(),
+            e.kinetic_total.into(),
+            h.balance.into(),
+            penetration.into(),
+            h.min_jacobian.into(),
+        ])?;
+        let numbers: Vec<f64> = [time, degrees].into_iter().chain(e.columns().map(|(_, value)| value)).collect();
+        self.energies.numbers(&numbers)?;
+        let numbers: Vec<f64> =
+            [time, degrees].into_iter().chain(stress.concat().into_iter().map(|p| p / area)).collect();
+        self.stress.numbers(&numbers)?;
+        if let Some(table) = &mut self.yarns {
+            let yarns = yarns::measure(&s.mesh, &s.frame())?;
+            let [warp, weft] = [Ply::Warp, Ply::Weft].map(|ply| yarns::ply(&yarns, ply));
+            let means = [&warp, &weft].map(|p| [p.width.mean, p.thickness.mean, p.gap.mean]);
+            let spreads = [&warp, &weft].map(|p| [p.width.std, p.thickness.std, p.gap.std]);
+            let numbers: Vec<f64> = [time, degrees].into_iter().chain(means.concat()).chain(spreads.concat()).collect();
+            table.numbers(&numbers)?;
+        }
+        if let Some(table) = &mut self.stitches {
+            let t = stitches::measure(&s.mesh, &s.tensions())?;
+            table.numbers(&[
+                time,
+                degrees,
+                t.all.min_n,
+                t.all.mean_n,
+                t.all.max_n,
+                t.all.slack_share,
+                t.loops.mean_n,
+                t.loops.slack_share,
+                t.underlaps.mean_n,
+                t.underlaps.slack_share,
+            ])?;
+        }
+        Ok(())
+    }
+
+    /// A frame for ParaView, and a picture of it.
+    fn write_frame(&mut self, name: &str) -> Result<()> {
+        let s = &self.simulation;
+        let frame = s.frame();
+        let dir = &self.options.output;
+        let file = format!("frames/{:04}-{name}.vtu", self.frames.len());
+        vtu::write(&s.mesh, &frame, &dir.join(&file))?;
+        self.frames.push((frame.time, file));
+        vtu::write_collection(&dir.join("run.pvd"), &self.frames)?;
+        if self.loaded.case.output.pictures {
+            let path = dir.join(format!("{:04}-{name}.png", self.frames.len() - 1));
+            draw(&s.mesh, &frame, &self.loaded.case.title, None, 1600, &path)?;
+            self.pictures.push(path);
+        }
+        Ok(())
+    }
+
+    /// Summary and the last lines, whatever the end was.
+    fn finish(mut self, result: Result<()>) -> Result<Outcome> {
+        let interrupted = self.stopped.load(Ordering::Relaxed);
+        if matches!(result, Err(Error::Guard(_))) {
+            // what the scene looks like where it went wrong; a failure to write must not hide the guard
+            let _ = self.write_frame("stopped");
+        }
+        let verdict = match &result {
+            Ok(()) if interrupted => "interrupted".to_owned(),
+            Ok(()) => "finished".to_owned(),
+            Err(error) => error.to_string(),
+        };
+        self.write_summary(&verdict)?;
+        result?;
+        Ok(Outcome { interrupted, text: self.lines(&verdict) })
+    }
+
+    fn write_summary(&self, verdict: &str) -> Result<()> {
+        let s = &self.simulation;
+        let (e, h) = (s.energies(), s.health());
+        let sum = |m: &[f64]| m.iter().sum::<f64>();
+        let first = s.model.first_thread;
+        let floor = |range: std::ops::Range<usize>| {
+            let mass = sum(&s.model.true_mass[range.clone()]);
+            if mass > 0.0 { sum(&s.model.mass[range]) / mass - 1.0 } else { 0.0 }
+        };
+        let summary = json!({
+            "verdict": verdict,
+            "case": self.loaded.case,
+            "defaults": self.loaded.defaults.iter().map(|(path, value)| json!({"path": path, "value": value})).collect::<Vec<_>>(),
+            "hexes": s.mesh.hexes(),
+            "beams": s.mesh.beams(),
+            "nodes": s.mesh.nodes.len(),
+            "backend": s.backend().describe(),
+            "steps": s.step(),
+            "time_s": s.time(),
+            "dt_smallest_s": self.dt_range[0],
+            "dt_largest_s": self.dt_range[1],
+            "dt_limit_s": h.dt_limit,
+            "contact_searches": s.searches(),
+            "wall_s": self.started.elapsed().as_secs_f64(),
+            "stage_wall_s": s.backend().timings().into_iter().map(|(name, t)| json!({"stage": name, "s": t})).collect::<Vec<_>>(),
+            "added_mass": {
+                "floor_solids": floor(0..first),
+                "floor_threads": floor(first..s.mesh.nodes.len()),
+                "contact_solids_largest": self.largest_added[0],
+                "contact_threads_largest": self.largest_added[1],
+            },
+            "worst_energy_balance": self.worst_balance,
+            "worst_kinetic_over_internal_in_shear": self.worst_kinetic,
+            "energies_mj": e.columns().into_iter().map(|(name, value)| (name.to_owned(), json!(value))).collect::<serde_json::Map<_, _>>(),
+            "state_hash": format!("{:016x}", s.state_hash()),
+            "frames": self.frames.iter().map(|(time, file)| json!({"time_s": time, "file": file})).collect::<Vec<_>>(),
+        });
+        let path = self.options.output.join("summary.json");
+        file::replace(&path, |w| serde_json::to_writer_pretty(w, &summary).map_err(Into::into))
+    }
+
+    /// The lines a person wants to read.
+    fn lines(&self, verdict: &str) -> String {
+        let s = &self.simulation;
+        let (e, h) = (s.energies(), s.health());
+        let mut t = String::new();
+        let wall = self.started.elapsed().as_secs_f64();
+        // writing to a String does not fail
+        let _ = writeln!(t, "{}: {verdict}", self.loaded.case.title);
+        let _ = writeln!(
+            t,
+            "mesh       {} hexes, {} beams, {} nodes; {}",
+            s.mesh.hexes(),
+            s.mesh.beams(),
+            s.mesh.nodes.len(),
+            s.backend().describe()
+        );
+        let _ = writeln!(
+            t,
+            "time       {:.3} ms in {} steps of {:.2e} to {:.2e} s, {} contact searches; {wall:.1} s of wall time",
+            1e3 * s.time(),
+            s.step(),
+            self.dt_range[0],
+            self.dt_range[1],
+            s.searches()
+        );
+        for (name, sizes, target) in [
+            ("warp", &self.settled, "4.59 ± 0.13 / 0.38 ± 0.06 / 0.39 ± 0.10"),
+            ("weft", &self.settled_weft, "2.08 ± 0.08 / 0.38 ± 0.04 / 0.40 ± 0.04"),
+        ] {
+            if let Some(p) = sizes {
+                let _ = writeln!(
+                    t,
+                    "{name}       width / thickness / gap {:.2} / {:.2} / {:.2} mm before shear (PX35 tomography {target})",
+                    p.width.mean, p.thickness.mean, p.gap.mean
+                );
+            }
+        }
+        if let Ok(tension) = stitches::measure(&s.mesh, &s.tensions())
+            && !s.mesh.threads.is_empty()
+        {
+            let all = tension.all;
+            let _ = writeln!(
+                t,
+                "stitch     tension {:.3} / {:.3} / {:.3} N (min / mean / max), {:.0} % slack",
+                all.min_n,
+                all.mean_n,
+                all.max_n,
+                100.0 * all.slack_share
+            );
+        }
+        if !self.curve.is_empty() {
+            let at = |angle: f64| {
+                let near = self.curve.iter().filter(|(a, _)| (a.abs() - angle).abs() <= 1.0).map(|(_, f)| *f);
+                let (sum, count) = near.fold((0.0, 0), |(s, n), f| (s + f, n + 1));
+                (count > 0).then(|| format!("{:.4} at {angle}°", sum / f64::from(count)))
+            };
+            let forces: Vec<String> = [5.0, 15.0, 25.0, 35.0, 45.0].into_iter().filter_map(at).collect();
+            let _ = writeln!(t, "F_nor      {} N/mm (mean over ±1°)", forces.join(", "));
+        }
+        let _ = writeln!(
+            t,
+            "energy     internal {:.3} mJ, friction {:.3} mJ; balance within {:.2} %; kinetic under {:.2} % of internal in shear",
+            e.internal(),
+            e.friction,
+            100.0 * self.worst_balance,
+            100.0 * self.worst_kinetic
+        );
+        let _ = writeln!(
+            t,
+            "checks     smallest det F {:.3}; added mass at most {:.1} % of yarns, {:.1} % of threads; state {:016x}",
+            h.min_jacobian,
+            100.0 * self.largest_added[0],
+            100.0 * self.largest_added[1],
+            s.state_hash()
+        );
+        let picture = self.pictures.last().map_or(String::new(), |p| format!("; picture {}", p.display()));
+        let _ = write!(t, "results    {}{picture}", self.options.output.display());
+        t
+    }
+}
+
+fn draw(mesh: &Mesh, frame: &Frame, title: &str, field: Option<&str>, width: usize, path: &Path) -> Result<()> {
+    let title = if frame.angle_deg == 0.0 {
+        format!("{title}, t = {:.2} ms", 1e3 * frame.time)
+    } else {
+        format!("{title}, {:.1}°", frame.angle_deg)
+    };
+    let view = View { field: field.map(str::to_owned), width_px: width, title, ..View::default() };
+    render(mesh, frame, &view)?.write_png(path)
+}
+
+/// Writes the mesh of a case to a folder: VTU and Abaqus input; returns its report.
+pub fn mesh(loaded: &Loaded, dir: &Path) -> Result<String> {
+    let (mesh, _) = scene(loaded)?;
+    std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
+    let frame = Frame { gradient: [[1.0, 0.0], [0.0, 1.0]], positions: mesh.nodes.clone(), ..Frame::default() };
+    vtu::write(&mesh, &frame, &dir.join("mesh.vtu"))?;
+    export::write_inp(&mesh, &dir.join("mesh.inp"))?;
+    draw(&mesh, &frame, &loaded.case.title, None, 1600, &dir.join("mesh.png"))?;
+    let files = format!("written    {0}/mesh.vtu, {0}/mesh.inp, {0}/mesh.png", dir.display());
+    Ok(format!("{}\n{files}", report::report(&mesh, &loaded.case)))
+}
+
+/// Sizes and cost of a case; with `explain` the defaults in use and every stage of its plan.
+pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
+    let (mesh, friction) = scene(loaded)?;
+    let model = plan::build(&loaded.case, friction, &mesh, Capacity::default())?;
+    let bytes: usize = model.plan.buffers.iter().map(|b| 4 * b.len).sum();
+    let mut probe = Simulation::new(&loaded.case, friction, mesh, Make::default())?;
+    probe.advance(0.0, |_| false)?;
+    let started = Instant::now();
+    let (dt, end) = (probe.dt(), probe.schedule.end());
+    // a few steps for the expected time; the first burst warms up
+    probe.advance(16.0 * dt, |_| false)?;
+    let warm = Instant::now();
+    let steps = probe.step();
+    probe.advance(probe.time() + 64.0 * dt, |_| false)?;
+    let per_step = warm.elapsed().as_secs_f64() / (probe.step() - steps).max(1) as f64;
+    let _ = started;
+    let settled = loaded
+        .case
+        .integration
+        .dt_s
+        .unwrap_or(loaded.case.integration.dt_max_s.min(loaded.case.integration.safety * probe.health().dt_limit));
+    let steps = end / settled;
+    let mut t = String::new();
+    // writing to a String does not fail
+    let _ = writeln!(t, "{}: valid", loaded.case.title);
+    let _ = writeln!(
+        t,
+        "mesh       {} hexes, {} beams, {} nodes; {:.1} MB of buffers in f32",
+        probe.mesh.hexes(),
+        probe.mesh.beams(),
+        probe.mesh.nodes.len(),
+        bytes as f64 / 1e6
+    );
+    let _ = writeln!(t, "effects    {}", effects(loaded).join(", "));
+    let _ = write!(
+        t,
+        "time       {:.3} ms; limit {:.2e} s at node {} ({}), step {settled:.2e} s, about {steps:.0} steps of {:.3} ms: {:.0} s on {}",
+        1e3 * end,
+        probe.health().dt_limit,
+        probe.health().limiting_node,
+        probe.node_owner(probe.health().limiting_node),
+        1e3 * per_step,
+        per_step * steps,
+        probe.backend().describe()
+    );
+    if explain {
+        let plan = &model.plan;
+        for (list, stages) in
+            [("step", &plan.step), ("watch", &plan.watch), ("search", &plan.search), ("diagnose", &plan.diagnose)]
+        {
+            let _ = write!(t, "\n{list}");
+            for stage in stages {
+                let names = |buffers: Vec<_>| {
+                    let names: Vec<&str> =
+                        buffers.into_iter().map(|b: crate::kernel::buffer::Buffer| plan.buffers[b.0].name).collect();
+                    names.join(", ")
+                };
+                let _ = write!(
+                    t,
+                    "\n  {:<14} {:>7} items  reads {}; writes {}",
+                    stage.name,
+                    stage.count,
+                    names(stage.reads.clone()),
+                    names(stage.writes.iter().map(|w| w.0).collect())
+                );
+            }
+        }
+        let _ = write!(t, "\ndefaults");
+        for (path, value) in &loaded.defaults {
+            let _ = write!(t, "\n  {path} = {value}");
+        }
+    }
+    Ok(t)
+}
+
+/// Names of the effects that are on.
+fn effects(loaded: &Loaded) -> Vec<String> {
+    let e = &loaded.case.effects;
+    let contact = e.contact.as_ref();
+    let on = [
+        ("thread–yarn contact", contact.is_some_and(|c| c.thread_yarn)),
+        ("yarn–yarn contact", contact.is_some_and(|c| c.yarn_yarn)),
+        ("thread–thread contact", contact.is_some_and(|c| c.thread_thread)),
+        ("friction", contact.is_some_and(|c| c.friction)),
+        ("bending", e.bending),
+        ("damping", e.damping.is_some()),
+        ("fibre lines", e.fibre_lines.is_some()),
+        ("contact mass", e.contact_mass.is_some()),
+        ("mass floor", e.mass_floor > 0.0),
+        ("gravity", e.gravity_mm_s2.is_some()),
+        ("periodic cell", matches!(loaded.case.domain, Domain::Cell { .. })),
+    ];
+    on.into_iter().filter(|(_, on)| *on).map(|(name, _)| name.to_owned()).collect()
 }
 
 /// Renders a frame, or the last frame of a run, to a PNG.
 pub fn picture(_source: &Path, _field: Option<&str>, _width: usize, _out: &Path) -> Result<String> {
-    Err(missing("picture"))
-}
-
-fn missing(command: &str) -> Error {
-    Error::Unsupported(format!("this build has no `{command}`"))
+    Err(Error::Unsupported("pictures of written frames are not built yet".into()))
 }

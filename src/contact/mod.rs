@@ -11,6 +11,7 @@ pub mod friction;
 pub mod grid;
 pub mod penalty;
 pub mod threads;
+pub mod travel;
 
 use crate::kernel::lane::Real;
 use bytemuck::{Pod, Zeroable};
@@ -85,8 +86,8 @@ pub mod status {
     pub const TRAVEL: usize = 1;
     /// Largest penetration of a thread into a yarn, of yarns, of threads; bits of an f32, mm.
     pub const PENETRATION: [usize; 3] = [2, 3, 4];
-    /// Largest speed, bits of an f32, mm/s.
-    pub const SPEED: usize = 5;
+    /// Largest contact stiffness over mass, bits of an f32, 1/s².
+    pub const CONTACT_RATE: usize = 5;
     /// Nodes and beams that touch something.
     pub const TOUCHING: [usize; 3] = [6, 7, 8];
     /// Size of the buffer.

@@ -1,11 +1,13 @@
 //! Accelerations: each node gathers its corner slots in a fixed order, adds contact, and divides by its mass.
 //!
-//! With contact-aware mass, a node is as heavy as a stable step needs, m ≥ dt²/4 · K, with K the row sum of the contact
-//! stiffness at the node; what was added fades once contact is lost.
+//! With contact-aware mass, a node in contact is as heavy as a stable step needs, m ≥ dt²/4 · K, with K the row sum of the
+//! stiffness of contact and of elements at the node; what was added fades once contact is lost. Without it, the largest
+//! K/m of contact is reported for the choice of the time step.
 
+use crate::contact::status::CONTACT_RATE;
 use crate::elements::hex8::LANES;
 use crate::kernel::lane::{Lane, Real};
-use crate::kernel::stage::{Io, Kernel};
+use crate::kernel::stage::{Io, Kernel, raise};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
@@ -38,16 +40,19 @@ pub const THREAD_SLOTS: usize = 2;
 pub const BEAM_FORCE: usize = 3;
 pub const BEND_FORCE: usize = 4;
 pub const MASS: usize = 5;
+/// Row sums of element stiffness, N/mm.
+pub const ELEMENT_STIFFNESS: usize = 6;
 /// Acceleration, mm/s² (3 planes).
-const ACCELERATION: usize = 6;
+const ACCELERATION: usize = 7;
 /// Inverse of the mass that acts, 1/tonne.
-const INVERSE_MASS: usize = 7;
+const INVERSE_MASS: usize = 8;
 /// Contact force in quanta (3 planes), set back to zero.
-const CONTACT_FORCE: usize = 8;
+const CONTACT_FORCE: usize = 9;
 /// Contact stiffness in quanta, set back to zero.
-const CONTACT_STIFFNESS: usize = 9;
-/// Added mass, tonne.
-const ADDED_MASS: usize = 10;
+const CONTACT_STIFFNESS: usize = 10;
+/// Added mass, tonne; without contact-aware mass, the status.
+const ADDED_MASS: usize = 11;
+const STATUS: usize = 11;
 
 /// Assembly; with `CONTACT` contact forces, with `MASS_ADDED` contact-aware mass.
 pub struct Assemble<const CONTACT: bool, const MASS_ADDED: bool>;
@@ -63,11 +68,12 @@ impl<const CONTACT: bool, const MASS_ADDED: bool> Kernel for Assemble<CONTACT, M
         let mut acceleration = io.own::<L::Scalar>(ACCELERATION);
         let mut inverse = io.own::<L::Scalar>(INVERSE_MASS);
         let mut contact_force = CONTACT.then(|| io.own::<i32>(CONTACT_FORCE));
-        let mut contact_stiffness = MASS_ADDED.then(|| io.own::<i32>(CONTACT_STIFFNESS));
+        let mut contact_stiffness = CONTACT.then(|| io.own::<i32>(CONTACT_STIFFNESS));
+        let elements = io.scalars(ELEMENT_STIFFNESS);
         let mut added = MASS_ADDED.then(|| io.own::<L::Scalar>(ADDED_MASS));
         let zero = L::Scalar::from_f64(0.0);
         let real = |x: f32| L::Scalar::from_f64(f64::from(x));
-        let reach = real(params.mass_factor * 0.25) * io.row.dt * io.row.dt * real(params.stiffness_quantum);
+        let reach = real(params.mass_factor * 0.25) * io.row.dt * io.row.dt;
         for node in items {
             let mut force = [zero; 3];
             if node < first_thread {
@@ -104,13 +110,18 @@ impl<const CONTACT: bool, const MASS_ADDED: bool> Kernel for Assemble<CONTACT, M
                 }
             }
             let mut mass = masses[node];
-            if let (Some(stiffness), Some(added)) = (&mut contact_stiffness, &mut added) {
+            if let Some(stiffness) = &mut contact_stiffness {
                 let quanta = stiffness.at(0, node);
-                let needed = (L::Scalar::from_i32(*quanta) * reach - mass).max(zero);
+                let contact = L::Scalar::from_i32(*quanta) * real(params.stiffness_quantum);
                 *quanta = 0;
-                let added = added.at(0, node);
-                *added = needed.max(*added * real(params.mass_memory));
-                mass = mass + *added;
+                if let Some(added) = &mut added {
+                    let needed = if contact > zero { (contact + elements[node]) * reach - mass } else { zero };
+                    let added = added.at(0, node);
+                    *added = needed.max(*added * real(params.mass_memory));
+                    mass = mass + *added;
+                } else if contact > zero {
+                    raise(&io.atomic_uints(STATUS)[CONTACT_RATE], contact / mass);
+                }
             }
             let inverse_mass = L::Scalar::from_f64(1.0) / mass;
             *inverse.at(0, node) = inverse_mass;

@@ -116,12 +116,14 @@ fn add_yarn(
         _ => (&layout.weft, resolution.weft_columns, layout.pitch[1], lx, layout.middle[1]),
     };
     let slices = (length / resolution.slice_mm).round() as usize;
+    // Slices of equal quanta, but for the last: their hexahedra share shapes.
+    let slice_length = quantised(length / slices as f64);
     let centre = quantised((index as f64 + 0.5) * pitch);
     let first = mesh.nodes.len();
     for row in section.grid(columns, resolution.layers) {
         for [u, v] in row {
             let [u, z] = [quantised(u), quantised(middle + v)];
-            mesh.nodes.extend((0..slices).map(|slice| quantised(length * slice as f64 / slices as f64)).map(|along| {
+            mesh.nodes.extend((0..slices).map(|slice| slice as f64 * slice_length).map(|along| {
                 match ply {
                     // Fibres along y and layers along z: columns run against x.
                     Ply::Warp => [centre - u, along, z],

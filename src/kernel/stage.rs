@@ -47,6 +47,8 @@ pub struct Plan {
     pub search: Vec<Stage>,
     /// Run every time step.
     pub step: Vec<Stage>,
+    /// Run every few steps, to see whether a search is due.
+    pub watch: Vec<Stage>,
     /// Run when energies and limits are wanted.
     pub diagnose: Vec<Stage>,
 }

@@ -6,7 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Files and folders that a run writes; pictures (`*.png`) and meshes (`*.vtu`, `*.inp`) come on top.
-const OWN: [&str; 12] = [
+const OWN: [&str; 13] = [
+    "stress.csv",
     "history.csv",
     "energies.csv",
     "yarns.csv",

@@ -11,7 +11,9 @@ mod threads;
 use crate::case::Case;
 use crate::case::domain::Domain;
 use crate::conditions::prescribed;
-use crate::contact::{self, Params as ContactParams, candidates, grid, penalty, status, threads as thread_contact};
+use crate::contact::{
+    self, Params as ContactParams, candidates, grid, penalty, status, threads as thread_contact, travel,
+};
 use crate::dynamics::{assemble, fibre_lines, integrate, time_step};
 use crate::elements::{beam2, bend, hex8};
 use crate::error::{Error, Result};
@@ -263,6 +265,13 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         });
     }
 
+    let element_limit = b.scratch("element stiffness of nodes", 2 * nodes);
+    let search_quanta = b.add("quanta at the last search", Kind::Int, 3 * nodes, true, Initial::Zero);
+    let search_remainder = b.add("remainder at the last search", Kind::Scalar, 3 * nodes, true, Initial::Zero);
+    let reads = [quanta_, remainder, search_quanta, search_remainder];
+    let writes = [(status_, Access::Atomic)];
+    b.plan.watch.push(after::<travel::Travel>("travel", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0]));
+
     // contact
     let contact = match &effects.contact {
         Some(chosen) => {
@@ -286,6 +295,10 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         None => None,
     };
 
+    let writes = [(search_quanta, own(3, 1)), (search_remainder, own(3, 1))];
+    let reads = [quanta_, remainder];
+    b.plan.search.push(after::<travel::Remember>("remember", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0]));
+
     // accelerations
     let solid_slots = b.indices("corner slots of solid nodes", solids.slots.clone());
     let thread_slots = b.indices("slots of thread nodes", threads.slots.clone());
@@ -297,7 +310,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         mass_factor: contact_mass.map_or(0.0, |c| c.factor as f32),
         mass_memory: contact_mass.map_or(0.0, |c| c.memory as f32),
     };
-    let reads = [solid_slots, hex_force, thread_slots, beam_force, bend_force, mass];
+    let reads = [solid_slots, hex_force, thread_slots, beam_force, bend_force, mass, element_limit];
     let mut writes = vec![(acceleration, own(3, 1)), (inverse_mass, own(1, 1))];
     let mut added_mass = None;
     let assembly = match &contact {
@@ -305,13 +318,14 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             after::<assemble::Assemble<false, false>>("assemble", nodes, NODE_GRAIN, &reads, &writes, assemble_params)
         }
         Some(contact) => {
-            writes.push((contact.force, own(3, 1)));
+            writes.extend([(contact.force, own(3, 1)), (contact.stiffness, own(1, 1))]);
             if contact_mass.is_some() {
                 let added = b.add("added mass", Kind::Scalar, nodes, true, Initial::Zero);
                 added_mass = Some(added);
-                writes.extend([(contact.stiffness, own(1, 1)), (added, own(1, 1))]);
+                writes.push((added, own(1, 1)));
                 after::<assemble::Assemble<true, true>>("assemble", nodes, NODE_GRAIN, &reads, &writes, assemble_params)
             } else {
+                writes.push((status_, Access::Atomic));
                 after::<assemble::Assemble<true, false>>(
                     "assemble",
                     nodes,
@@ -389,7 +403,6 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let constant = constant_stiffness(mesh, &threads, &line_stiffness, &covered);
     let constant = b.table("constant stiffness of nodes", constant);
     let solid_bounds = b.indices("corner bounds of solid nodes", solids.bounds.clone());
-    let element_limit = b.scratch("element stiffness of nodes", 2 * nodes);
     let reads = [solid_bounds, hex_bound, constant, mass];
     let params = time_step::Params { first_thread };
     let writes = [(element_limit, own(2, 1))];

@@ -1,0 +1,161 @@
+//! Load steps in time: what is prescribed at any moment, as smooth functions, and as the row of one time step.
+
+use crate::case::effects::Effects;
+use crate::case::steps::Step;
+use crate::kernel::row::Row;
+use crate::measure::shear::trellis;
+
+/// The load steps of a case.
+#[derive(Debug, Clone)]
+pub struct Schedule {
+    phases: Vec<Phase>,
+    damping: [f64; 2],
+    initial_radius: f64,
+}
+
+/// One load step with its time and what it starts from.
+#[derive(Debug, Clone)]
+pub struct Phase {
+    pub name: &'static str,
+    /// Start and end, s.
+    pub start: f64,
+    pub end: f64,
+    from: Load,
+    to: Load,
+    /// Threads are damped as they settle.
+    settles: bool,
+}
+
+/// What is prescribed at one moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Load {
+    /// Shear angle, rad.
+    pub angle: f64,
+    /// Share of the thermal strain.
+    pub thermal: f64,
+    /// Contact radius over full radius.
+    pub radius: f64,
+    /// Amplitude of prescribed motion.
+    pub motion: f64,
+}
+
+/// S(τ) = τ²(3 − 2τ): no velocity at either end.
+fn smooth(t: f64) -> f64 {
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// A ramp of constant velocity, but for the first and the last tenth, over which the velocity grows and falls linearly.
+fn ramp(t: f64) -> f64 {
+    const ENDS: f64 = 0.1;
+    let rise = |t: f64| t * t / (2.0 * ENDS);
+    let total = 1.0 - ENDS;
+    if t < ENDS {
+        rise(t) / total
+    } else if t > 1.0 - ENDS {
+        1.0 - rise(1.0 - t) / total
+    } else {
+        (t - 0.5 * ENDS) / total
+    }
+}
+
+impl Schedule {
+    /// The schedule of a case.
+    pub fn new(steps: &[Step], effects: &Effects) -> Self {
+        let initial_radius = effects.contact.as_ref().map_or(1.0, |c| c.initial_radius_ratio);
+        let pretensioned = steps.iter().any(|s| matches!(s, Step::Pretension { .. }));
+        let radius = if pretensioned { initial_radius } else { 1.0 };
+        let mut load = Load { angle: 0.0, thermal: 0.0, radius, motion: 0.0 };
+        let mut start = 0.0;
+        let mut phases = Vec::new();
+        for step in steps {
+            let to = match *step {
+                Step::Settle { .. } | Step::Hold { .. } => load,
+                Step::Pretension { .. } => Load { thermal: 1.0, radius: 1.0, ..load },
+                Step::Shear { angle_deg, .. } => Load { angle: angle_deg.to_radians(), ..load },
+                Step::Move { .. } => Load { motion: 1.0, ..load },
+            };
+            let end = start + step.time();
+            let settles = matches!(step, Step::Settle { .. } | Step::Pretension { .. });
+            phases.push(Phase { name: step.name(), start, end, from: load, to, settles });
+            (load, start) = (to, end);
+        }
+        let damping = effects.damping.as_ref().map_or([0.0; 2], |d| [d.rate_per_s, d.thread_settle_rate_per_s]);
+        Self { phases, damping, initial_radius: radius.min(initial_radius) }
+    }
+
+    pub fn phases(&self) -> &[Phase] {
+        &self.phases
+    }
+
+    /// End of the last load step, s.
+    pub fn end(&self) -> f64 {
+        self.phases.last().map_or(0.0, |p| p.end)
+    }
+
+    /// Number of the load step at a time; a moment between two belongs to the earlier one.
+    pub fn phase_at(&self, time: f64) -> usize {
+        self.phases.iter().position(|p| time <= p.end).unwrap_or(self.phases.len().saturating_sub(1))
+    }
+
+    /// What is prescribed at a time.
+    pub fn load(&self, time: f64) -> Load {
+        let Some(phase) = self.phases.get(self.phase_at(time)) else {
+            return Load { angle: 0.0, thermal: 0.0, radius: self.initial_radius, motion: 0.0 };
+        };
+        let t = ((time - phase.start) / (phase.end - phase.start)).clamp(0.0, 1.0);
+        let between = |a: f64, b: f64, t: f64| a + (b - a) * t;
+        Load {
+            angle: between(phase.from.angle, phase.to.angle, ramp(t)),
+            thermal: between(phase.from.thermal, phase.to.thermal, smooth(t)),
+            radius: between(phase.from.radius, phase.to.radius, smooth((2.0 * t).min(1.0))),
+            motion: between(phase.from.motion, phase.to.motion, ramp(t)),
+        }
+    }
+
+    /// The row of a step at `time` that goes on by `dt` and was reached by `before`.
+    pub fn row(&self, time: f64, dt: f64, before: f64) -> Row<f64> {
+        let now = self.load(time);
+        let last = self.load((time - before).max(0.0));
+        let next = self.load(time + dt);
+        let [f, old] = [now.angle, last.angle].map(trellis);
+        let mut row = Row { dt, dt_mid: 0.5 * (dt + before), ..Row::default() };
+        for i in 0..2 {
+            for j in 0..2 {
+                row.gradient[i][j] = f[i][j] - if i == j { 1.0 } else { 0.0 };
+                row.rate[i][j] = (f[i][j] - old[i][j]) / before;
+            }
+        }
+        row.thermal = now.thermal;
+        row.thermal_increment = now.thermal - last.thermal;
+        row.radius = now.radius;
+        row.radius_increment = now.radius - last.radius;
+        row.motion = (next.motion - now.motion) / dt;
+        let settles = self.phases.get(self.phase_at(time)).is_some_and(|p| p.settles);
+        row.damping_solid = self.damping[0];
+        row.damping_thread = if settles { self.damping[1] } else { self.damping[0] };
+        row
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn amplitudes_are_smooth_and_reach_their_ends() {
+        let steps = [
+            Step::Pretension { time_s: 2.0 },
+            Step::Hold { time_s: 1.0 },
+            Step::Shear { angle_deg: 50.0, time_s: 4.0 },
+        ];
+        let schedule = Schedule::new(&steps, &Effects::default());
+        assert_eq!(schedule.load(2.0).thermal, 1.0);
+        assert_eq!(schedule.load(3.0).angle, 0.0);
+        assert!((schedule.load(7.0).angle.to_degrees() - 50.0).abs() < 1e-12);
+        let speed = |t: f64| (schedule.load(t + 1e-6).angle - schedule.load(t - 1e-6).angle) / 2e-6;
+        assert!(speed(3.0).abs() < 1e-4 && speed(7.0).abs() < 1e-4 && speed(5.0) > 0.2);
+        for t in [0.5, 3.1, 3.4, 5.0, 6.7] {
+            assert!((speed(t + 1e-4) - speed(t)).abs() < 1e-3, "a kink at {t}");
+        }
+    }
+}
