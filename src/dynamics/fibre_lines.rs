@@ -171,7 +171,7 @@ fn solve<L: Lane>(io: &Io<L::Scalar>, group: &Group, s: &mut Sweep<L::Scalar>) {
         let next = (i + 1) % n;
         let v: [L; 3] = s.vector(i, DIRECTION);
         let inverse_length = one / dot(v, v).sqrt();
-        let d = v.map(|v| v * inverse_length);
+        let d = [v[0] * inverse_length, v[1] * inverse_length, v[2] * inverse_length];
         let (a, b): ([L; 3], [L; 3]) = (s.vector(i, RESPONSE), s.vector(next, RESPONSE));
         let right = -dot(d, [b[0] - a[0], b[1] - a[1], b[2] - a[2]]);
         let stiffness: L = s.get(i, DIAGONAL);

@@ -50,8 +50,6 @@ pub struct Header {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct Params {
-    /// First block of the stage's law.
-    pub first: u32,
     /// Nodes in a plane of the position buffers.
     pub nodes: u32,
 }
@@ -113,13 +111,17 @@ impl<'a, L: Lane> Lanes<'a, L> {
     #[inline(always)]
     fn frame(&self, io: &Io<L::Scalar>) -> Tensor<L::Scalar> {
         let q = &io.scalars(FRAMES)[9 * self.header.frame as usize..][..9];
-        std::array::from_fn(|i| std::array::from_fn(|j| q[3 * i + j]))
+        [[q[0], q[1], q[2]], [q[3], q[4], q[5]], [q[6], q[7], q[8]]]
     }
 
     #[inline(always)]
     fn material(&self, io: &Io<L::Scalar>) -> [L; PARAMETERS] {
         let row = &io.scalars(MATERIALS)[PARAMETERS * self.header.material as usize..][..PARAMETERS];
-        std::array::from_fn(|k| L::splat(row[k]))
+        let mut parameters = [L::splat(row[0]); PARAMETERS];
+        for (parameter, value) in parameters.iter_mut().zip(row) {
+            *parameter = L::splat(*value);
+        }
+        parameters
     }
 
     /// Displacements of the corners relative to the first, in the fibre's frame, by component and binary corner.
@@ -157,22 +159,28 @@ impl<'a, L: Lane> Lanes<'a, L> {
                 row[binary] = L::load(&buffer);
             }
         }
-        let q: Tensor<L> = std::array::from_fn(|i| std::array::from_fn(|j| L::splat(frame[i][j])));
-        std::array::from_fn(|j| {
-            std::array::from_fn(|a| q[2][j].fma(global[2][a], q[1][j].fma(global[1][a], q[0][j] * global[0][a])))
-        })
+        let q = splat_tensor::<L>(frame);
+        let mut local = global;
+        for j in 0..3 {
+            for a in 0..8 {
+                local[j][a] = q[2][j].fma(global[2][a], q[1][j].fma(global[1][a], q[0][j] * global[0][a]));
+            }
+        }
+        local
     }
 
     /// Displacement gradient at a Gauss point, without the macroscopic part.
     #[inline(always)]
     fn gradient(&self, point: usize, d: &Derivatives<L>) -> Tensor<L> {
         let at = others(point);
-        let inverse: Tensor<L> = std::array::from_fn(|k| std::array::from_fn(|j| self.shape(point, 3 * k + j)));
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                d[i][2][at[2]].fma(inverse[2][j], d[i][1][at[1]].fma(inverse[1][j], d[i][0][at[0]] * inverse[0][j]))
-            })
-        })
+        let mut h = [[L::new(0.0); 3]; 3];
+        for j in 0..3 {
+            let inverse = [self.shape(point, j), self.shape(point, 3 + j), self.shape(point, 6 + j)];
+            for i in 0..3 {
+                h[i][j] = d[i][2][at[2]].fma(inverse[2], d[i][1][at[1]].fma(inverse[1], d[i][0][at[0]] * inverse[0]));
+            }
+        }
+        h
     }
 }
 
@@ -190,21 +198,27 @@ const EDGES: [([usize; 4], usize); 3] = [([0, 2, 4, 6], 1), ([0, 1, 4, 5], 2), (
 #[inline(always)]
 fn derivatives<L: Lane>(u: &[L; 8]) -> [[L; 4]; 3] {
     let (near, far) = (L::new(NEAR), L::new(FAR));
-    EDGES.map(|(low, step)| {
-        let d = low.map(|a| u[a + step] - u[a]);
+    let mut all = [[near; 4]; 3];
+    for k in 0..3 {
+        let (low, step) = EDGES[k];
+        let mut d = [near; 4];
+        for (d, a) in d.iter_mut().zip(low) {
+            *d = u[a + step] - u[a];
+        }
         let first = [
             near.fma(d[0], far * d[1]),
             far.fma(d[0], near * d[1]),
             near.fma(d[2], far * d[3]),
             far.fma(d[2], near * d[3]),
         ];
-        [
+        all[k] = [
             near.fma(first[0], far * first[2]),
             near.fma(first[1], far * first[3]),
             far.fma(first[0], near * first[2]),
             far.fma(first[1], near * first[3]),
-        ]
-    })
+        ];
+    }
+    all
 }
 
 /// The transpose of [`derivatives`]: forces on the corners.
@@ -233,63 +247,172 @@ fn corner_forces<L: Lane>(g: &[[L; 4]; 3]) -> [L; 8] {
     f
 }
 
-/// Qᵀ A Q.
+/// The same tensor in every lane.
 #[inline(always)]
-fn into_frame<R: Real>(q: &Tensor<R>, a: &Tensor<R>) -> Tensor<R> {
-    let aq: Tensor<R> =
-        std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * q[0][j] + a[i][1] * q[1][j] + a[i][2] * q[2][j]));
-    std::array::from_fn(|i| std::array::from_fn(|j| q[0][i] * aq[0][j] + q[1][i] * aq[1][j] + q[2][i] * aq[2][j]))
+fn splat_tensor<L: Lane>(a: &Tensor<L::Scalar>) -> Tensor<L> {
+    let mut splat = [[L::splat(a[0][0]); 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            splat[i][j] = L::splat(a[i][j]);
+        }
+    }
+    splat
+}
+
+/// Qᵀ A Q, or Q A Qᵀ if `out`.
+#[inline(always)]
+fn turn<L: Lane>(q: &Tensor<L>, a: &Tensor<L>, out: bool) -> Tensor<L> {
+    let zero = L::new(0.0);
+    let (mut half, mut full) = ([[zero; 3]; 3], [[zero; 3]; 3]);
+    for i in 0..3 {
+        for j in 0..3 {
+            for k in 0..3 {
+                half[i][j] = a[i][k].fma(if out { q[j][k] } else { q[k][j] }, half[i][j]);
+            }
+        }
+    }
+    for i in 0..3 {
+        for j in 0..3 {
+            for k in 0..3 {
+                full[i][j] = half[k][j].fma(if out { q[i][k] } else { q[k][i] }, full[i][j]);
+            }
+        }
+    }
+    full
+}
+
+/// Something to do at each Gauss point of one register of hexahedra.
+trait Visitor<L: Lane> {
+    fn point(&mut self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, volume: L);
 }
 
 /// Visits the Gauss points of one register of hexahedra with H, and with the volume of the point.
 #[inline(always)]
-fn visit<L: Lane>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize, mut each: impl FnMut(usize, &Tensor<L>, L)) {
+fn visit<L: Lane>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize, visitor: &mut impl Visitor<L>) {
     let frame = lanes.frame(io);
     let u = lanes.displacements(io, &frame, nodes);
-    let d: Derivatives<L> = std::array::from_fn(|i| derivatives(&u[i]));
-    let macroscopic = into_frame(&frame, &io.row.gradient);
+    let d = [derivatives(&u[0]), derivatives(&u[1]), derivatives(&u[2])];
+    let macroscopic = splat_tensor::<L>(&turn(&frame, &io.row.gradient, false));
     for point in 0..8 {
         let mut h = lanes.gradient(point, &d);
         for i in 0..3 {
             for j in 0..3 {
-                h[i][j] = h[i][j] + L::splat(macroscopic[i][j]);
+                h[i][j] = h[i][j] + macroscopic[i][j];
             }
         }
-        each(point, &h, lanes.shape(point, 9));
+        visitor.point(lanes, point, &h, lanes.shape(point, 9));
+    }
+}
+
+/// Sums stress into forces conjugate to derivatives, and for periodic scenes into V P̄.
+struct Stress<L: Lane, M, const PERIODIC: bool> {
+    material: [L; PARAMETERS],
+    forces: Derivatives<L>,
+    sum: Tensor<L>,
+    law: PhantomData<M>,
+}
+
+impl<L: Lane, M: Material, const PERIODIC: bool> Visitor<L> for Stress<L, M, PERIODIC> {
+    #[inline(always)]
+    fn point(&mut self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, volume: L) {
+        let mut p = M::stress(&self.material, h);
+        let at = others(point);
+        for i in 0..3 {
+            for j in 0..3 {
+                p[i][j] = p[i][j] * volume;
+                if PERIODIC {
+                    self.sum[i][j] = self.sum[i][j] + p[i][j];
+                }
+            }
+        }
+        for k in 0..3 {
+            let inverse = [lanes.shape(point, 3 * k), lanes.shape(point, 3 * k + 1), lanes.shape(point, 3 * k + 2)];
+            for i in 0..3 {
+                let g = p[i][2].fma(inverse[2], p[i][1].fma(inverse[1], p[i][0] * inverse[0]));
+                self.forces[i][k][at[k]] = self.forces[i][k][at[k]] - g;
+            }
+        }
+    }
+}
+
+/// Sums energies by mode and finds the smallest Jacobian.
+struct Energies<L: Lane, M> {
+    material: [L; PARAMETERS],
+    sum: [L; 4],
+    smallest: L,
+    law: PhantomData<M>,
+}
+
+impl<L: Lane, M: Material> Visitor<L> for Energies<L, M> {
+    #[inline(always)]
+    fn point(&mut self, _: &Lanes<L>, _: usize, h: &Tensor<L>, volume: L) {
+        for (sum, w) in self.sum.iter_mut().zip(M::energy(&self.material, h)) {
+            *sum = w.fma(volume, *sum);
+        }
+        self.smallest = self.smallest.min(jacobian(h));
+    }
+}
+
+/// Sums the bound of each corner's stiffness: modulus × |∇N_a| × Σ|∇N|, across the fibre.
+struct Bounds<L: Lane, M> {
+    material: [L; PARAMETERS],
+    rows: [L; 8],
+    law: PhantomData<M>,
+}
+
+impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
+    #[inline(always)]
+    fn point(&mut self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, volume: L) {
+        let mut sizes = [L::new(0.0); 8];
+        let mut total = L::new(0.0);
+        for (a, size) in sizes.iter_mut().enumerate() {
+            let (mut n, mut sign) = ([L::new(FAR); 3], [L::new(-1.0); 3]);
+            for k in 0..3 {
+                if a >> k & 1 == point >> k & 1 {
+                    n[k] = L::new(NEAR);
+                }
+                if a >> k & 1 == 1 {
+                    sign[k] = L::new(1.0);
+                }
+            }
+            let slope = [sign[0] * n[1] * n[2], sign[1] * n[0] * n[2], sign[2] * n[0] * n[1]];
+            let mut square = L::new(0.0);
+            for j in 1..3 {
+                let across = slope[2].fma(
+                    lanes.shape(point, 6 + j),
+                    slope[1].fma(lanes.shape(point, 3 + j), slope[0] * lanes.shape(point, j)),
+                );
+                square = across.fma(across, square);
+            }
+            *size = square.sqrt();
+            total = total + *size;
+        }
+        let k = M::stiffness(&self.material, h) * volume * total;
+        for (row, size) in self.rows.iter_mut().zip(sizes) {
+            *row = k.fma(size, *row);
+        }
     }
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { first, nodes } = io.params();
+        let Params { nodes } = io.params();
         let mut slots = io.own::<L::Scalar>(OUT);
-        let mut virials = PERIODIC.then(|| io.own::<L::Scalar>(OUT_VIRIAL));
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
-                let lanes = Lanes::<L>::new(io, item + first as usize, lane);
-                let material = lanes.material(io);
-                let mut forces: Derivatives<L> = [[[L::new(0.0); 4]; 3]; 3];
-                let mut sum: Tensor<L> = [[L::new(0.0); 3]; 3];
-                visit(io, &lanes, nodes as usize, |point, h, volume| {
-                    let p = M::stress(&material, h);
-                    let at = others(point);
-                    for i in 0..3 {
-                        let p = p[i].map(|p| p * volume);
-                        for k in 0..3 {
-                            let inverse = [0, 1, 2].map(|j| lanes.shape(point, 3 * k + j));
-                            let g = p[2].fma(inverse[2], p[1].fma(inverse[1], p[0] * inverse[0]));
-                            forces[i][k][at[k]] = forces[i][k][at[k]] - g;
-                        }
-                        if PERIODIC {
-                            for j in 0..3 {
-                                sum[i][j] = sum[i][j] + p[j];
-                            }
-                        }
-                    }
-                });
-                let q: Tensor<L> = lanes.frame(io).map(|row| row.map(L::splat));
-                let local: [[L; 8]; 3] = std::array::from_fn(|i| corner_forces(&forces[i]));
+                let lanes = Lanes::<L>::new(io, item, lane);
+                let zero = L::new(0.0);
+                let mut stress = Stress::<L, M, PERIODIC> {
+                    material: lanes.material(io),
+                    forces: [[[zero; 4]; 3]; 3],
+                    sum: [[zero; 3]; 3],
+                    law: PhantomData,
+                };
+                visit(io, &lanes, nodes as usize, &mut stress);
+                let q = splat_tensor::<L>(&lanes.frame(io));
+                let f = &stress.forces;
+                let local = [corner_forces(&f[0]), corner_forces(&f[1]), corner_forces(&f[2])];
                 let out = slots.item(0, item);
                 for (corner, &binary) in BINARY.iter().enumerate() {
                     for i in 0..3 {
@@ -298,16 +421,14 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
                         f.store(&mut out[(3 * corner + i) * LANES + lane..]);
                     }
                 }
-                if let Some(virials) = &mut virials {
+                if PERIODIC {
+                    let sum = turn(&q, &stress.sum, true);
+                    let mut virials = io.own::<L::Scalar>(OUT_VIRIAL);
                     let out = virials.item(0, item);
-                    let half: Tensor<L> = std::array::from_fn(|i| {
-                        std::array::from_fn(|j| q[j][2].fma(sum[i][2], q[j][1].fma(sum[i][1], q[j][0] * sum[i][0])))
-                    });
                     for i in 0..3 {
                         for j in 0..3 {
-                            let v = q[i][2].fma(half[2][j], q[i][1].fma(half[1][j], q[i][0] * half[0][j]));
                             let place = &mut out[(3 * i + j) * LANES + lane..];
-                            (L::load(place) + v).store(place);
+                            (L::load(place) + sum[i][j]).store(place);
                         }
                     }
                 }
@@ -319,24 +440,23 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
 impl<M: Material> Kernel for Energy<M> {
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { first, nodes } = io.params();
-        let mut energies = io.own::<L::Scalar>(OUT);
+        let Params { nodes } = io.params();
+        let mut out = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
-                let lanes = Lanes::<L>::new(io, item + first as usize, lane);
-                let material = lanes.material(io);
-                let mut sum = [L::new(0.0); 4];
-                let mut smallest = L::new(1e30);
-                visit(io, &lanes, nodes as usize, |_, h, volume| {
-                    for (sum, w) in sum.iter_mut().zip(M::energy(&material, h)) {
-                        *sum = w.fma(volume, *sum);
-                    }
-                    smallest = smallest.min(jacobian(h));
-                });
-                let out = energies.item(0, item);
-                for (mode, sum) in sum.into_iter().chain([smallest]).enumerate() {
+                let lanes = Lanes::<L>::new(io, item, lane);
+                let mut energies = Energies::<L, M> {
+                    material: lanes.material(io),
+                    sum: [L::new(0.0); 4],
+                    smallest: L::new(1e30),
+                    law: PhantomData,
+                };
+                visit(io, &lanes, nodes as usize, &mut energies);
+                let out = out.item(0, item);
+                for (mode, sum) in energies.sum.iter().enumerate() {
                     sum.store(&mut out[mode * LANES + lane..]);
                 }
+                energies.smallest.store(&mut out[4 * LANES + lane..]);
             }
         }
     }
@@ -345,41 +465,17 @@ impl<M: Material> Kernel for Energy<M> {
 impl<M: Material> Kernel for Bound<M> {
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { first, nodes } = io.params();
-        let mut bounds = io.own::<L::Scalar>(OUT);
+        let Params { nodes } = io.params();
+        let mut out = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
-                let lanes = Lanes::<L>::new(io, item + first as usize, lane);
-                let material = lanes.material(io);
-                let mut rows = [L::new(0.0); 8];
-                visit(io, &lanes, nodes as usize, |point, h, volume| {
-                    // size of each corner's shape gradient across the fibre
-                    let mut sizes = [L::new(0.0); 8];
-                    let mut total = L::new(0.0);
-                    for (a, size) in sizes.iter_mut().enumerate() {
-                        let n = |direction: usize| {
-                            if a >> direction & 1 == point >> direction & 1 { L::new(NEAR) } else { L::new(FAR) }
-                        };
-                        let sign = |direction: usize| if a >> direction & 1 == 1 { L::new(1.0) } else { L::new(-1.0) };
-                        let slope = [sign(0) * n(1) * n(2), sign(1) * n(0) * n(2), sign(2) * n(0) * n(1)];
-                        let across = |j: usize| {
-                            slope[2].fma(
-                                lanes.shape(point, 6 + j),
-                                slope[1].fma(lanes.shape(point, 3 + j), slope[0] * lanes.shape(point, j)),
-                            )
-                        };
-                        let (y, z) = (across(1), across(2));
-                        *size = y.fma(y, z * z).sqrt();
-                        total = total + *size;
-                    }
-                    let k = M::stiffness(&material, h) * volume * total;
-                    for (row, size) in rows.iter_mut().zip(sizes) {
-                        *row = k.fma(size, *row);
-                    }
-                });
-                let out = bounds.item(0, item);
+                let lanes = Lanes::<L>::new(io, item, lane);
+                let mut bounds =
+                    Bounds::<L, M> { material: lanes.material(io), rows: [L::new(0.0); 8], law: PhantomData };
+                visit(io, &lanes, nodes as usize, &mut bounds);
+                let out = out.item(0, item);
                 for (corner, &binary) in BINARY.iter().enumerate() {
-                    rows[binary].store(&mut out[corner * LANES + lane..]);
+                    bounds.rows[binary].store(&mut out[corner * LANES + lane..]);
                 }
             }
         }

@@ -24,6 +24,8 @@ pub enum Access {
 pub struct Stage {
     /// Name in messages, timings and `check --explain`.
     pub name: &'static str,
+    /// First item.
+    pub first: usize,
     /// Number of items.
     pub count: usize,
     /// Items in one chunk of work; fixed, so that results do not depend on the number of threads.

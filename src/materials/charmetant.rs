@@ -13,7 +13,7 @@
 //! and those are what the energy holds. The exponent p < 2 of compaction makes the tangent infinite at I_comp → 0⁻: below the
 //! cap the power is continued by the parabola with the same slope.
 
-use super::{Material, PARAMETERS, Tensor, jacobian};
+use super::{Material, PARAMETERS, Tensor, add_product, jacobian};
 use crate::kernel::lane::Lane;
 use crate::kernel::math::{asinh_ratio, exp, ln, log1p};
 
@@ -124,9 +124,7 @@ impl Material for Charmetant {
         let g_g = s.g2.fma(s.g2, s.g3 * s.g3);
         let s11 = s.inv_c * (p[K_ELONG].fma(s.i_elong, two * (g_tg * s.inv_c - k_sh * g_g)));
         let pk2 = [[s11, s12, s13], [s12, two * t22, two * t23], [s13, two * t23, two * t33]];
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| h[i][2].fma(pk2[2][j], h[i][1].fma(pk2[1][j], h[i][0].fma(pk2[0][j], pk2[i][j]))))
-        })
+        add_product(h, &pk2)
     }
 
     #[inline(always)]

@@ -56,3 +56,15 @@ pub fn jacobian<L: Lane>(h: &Tensor<L>) -> L {
     let z = h[1][0] * h[2][1] - b * h[2][0];
     a * x - h[0][1] * y + h[0][2] * z
 }
+
+/// (I + H) S: the first from the second Piola–Kirchhoff stress.
+#[inline(always)]
+pub fn add_product<L: Lane>(h: &Tensor<L>, s: &Tensor<L>) -> Tensor<L> {
+    let mut p = *s;
+    for i in 0..3 {
+        for j in 0..3 {
+            p[i][j] = h[i][2].fma(s[2][j], h[i][1].fma(s[1][j], h[i][0].fma(s[0][j], s[i][j])));
+        }
+    }
+    p
+}

@@ -30,18 +30,21 @@ impl Material for NeoHookean {
     #[inline(always)]
     fn stress<L: Lane>(p: &[L; PARAMETERS], h: &Tensor<L>) -> Tensor<L> {
         let one = L::new(1.0);
-        let f: Tensor<L> =
-            std::array::from_fn(|i| std::array::from_fn(|j| if i == j { one + h[i][j] } else { h[i][j] }));
+        let mut f = *h;
+        for (i, row) in f.iter_mut().enumerate() {
+            row[i] = one + row[i];
+        }
         let j = jacobian(h).max(L::new(CRUSHED));
-        let log = ln(j);
-        let k = (p[LAMBDA] * log - p[MU]) / j;
-        std::array::from_fn(|i| {
-            std::array::from_fn(|jj| {
+        let k = (p[LAMBDA] * ln(j) - p[MU]) / j;
+        let mut stress = f;
+        for i in 0..3 {
+            for jj in 0..3 {
                 let ([a, b], [c, d]) = (others(i), others(jj));
                 let cofactor = f[a][c] * f[b][d] - f[a][d] * f[b][c];
-                p[MU].fma(f[i][jj], k * cofactor)
-            })
-        })
+                stress[i][jj] = p[MU].fma(f[i][jj], k * cofactor);
+            }
+        }
+        stress
     }
 
     #[inline(always)]

@@ -148,6 +148,7 @@ fn beside<K: Kernel>(
 ) -> Stage {
     Stage {
         name,
+        first: 0,
         count,
         grain,
         reads: reads.to_vec(),
@@ -218,8 +219,8 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let hex_reads = [headers, corners, quanta_, remainder, shapes, frames, materials];
     for (law, range) in &solids.laws {
         let stages = HexStages {
-            params: hex8::Params { first: range.start as u32, nodes: nodes as u32 },
-            count: range.len(),
+            params: hex8::Params { nodes: nodes as u32 },
+            blocks: range.clone(),
             reads: &hex_reads,
             force: hex_force,
             virial: hex_virial,
@@ -452,7 +453,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
 /// The stages of hexahedra of one law.
 struct HexStages<'a> {
     params: hex8::Params,
-    count: usize,
+    blocks: std::ops::Range<usize>,
     reads: &'a [Buffer],
     force: Buffer,
     virial: Option<Buffer>,
@@ -464,21 +465,24 @@ impl HexStages<'_> {
     fn add<M: Material>(&self, b: &mut Builder) {
         /// Blocks in a chunk.
         const GRAIN: usize = 4;
-        let &Self { params, count, reads, force, .. } = self;
+        let &Self { params, reads, force, .. } = self;
+        let count = self.blocks.len();
+        let here = |stage: Stage| Stage { first: self.blocks.start, ..stage };
         let force = (force, own(1, hex8::SLOTS));
-        b.plan.step.push(match self.virial {
+        let force_stage = match self.virial {
             Some(virial) => {
                 let writes = [force, (virial, own(1, hex8::VIRIAL))];
                 beside::<hex8::Force<M, true>>("hex8", count, GRAIN, reads, &writes, params)
             }
             None => beside::<hex8::Force<M, false>>("hex8", count, GRAIN, reads, &[force], params),
-        });
+        };
+        b.plan.step.push(here(force_stage));
         if let Some(energy) = self.energy {
             let writes = [(energy, own(1, hex8::ENERGY))];
-            b.plan.diagnose.push(beside::<hex8::Energy<M>>("hex8 energy", count, GRAIN, reads, &writes, params));
+            b.plan.diagnose.push(here(beside::<hex8::Energy<M>>("hex8 energy", count, GRAIN, reads, &writes, params)));
         }
         let writes = [(self.bound, own(1, hex8::BOUND))];
-        b.plan.diagnose.push(beside::<hex8::Bound<M>>("hex8 bound", count, GRAIN, reads, &writes, params));
+        b.plan.diagnose.push(here(beside::<hex8::Bound<M>>("hex8 bound", count, GRAIN, reads, &writes, params)));
     }
 }
 
