@@ -26,6 +26,7 @@ pub fn slide<R: Real>(elastic: Vector<R>, motion: Vector<R>, normal: Vector<R>, 
     let half = R::from_f64(0.5) * stiffness;
     let new = if held > limit { scale(trial, limit / held) } else { trial };
     let gone = sub(trial, new);
-    let lost = (dot(elastic, elastic) - dot(turned, turned)) + (dot(trial, trial) - dot(new, new));
+    // work over the step with the mean of the force before and after, less what is stored
+    let lost = (dot(elastic, elastic) - dot(turned, turned)) + dot(add(turned, new), gone);
     Slide { elastic: new, slip: dot(gone, gone).sqrt(), dissipated: half * lost }
 }
