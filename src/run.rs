@@ -103,6 +103,8 @@ struct Run<'a> {
     frames: Vec<(f64, String)>,
     pictures: Vec<PathBuf>,
     curve: Vec<(f64, f64)>,
+    /// Shear angle (rad) and external work (mJ) at the last row.
+    last_shear: [f64; 2],
     settled: Option<yarns::Sizes>,
     settled_weft: Option<yarns::Sizes>,
     worst_balance: f64,
@@ -154,6 +156,7 @@ impl<'a> Run<'a> {
             frames: Vec::new(),
             pictures: Vec::new(),
             curve: Vec::new(),
+            last_shear: [0.0; 2],
             settled: None,
             settled_weft: None,
             worst_balance: 0.0,
@@ -246,7 +249,17 @@ impl<'a> Run<'a> {
         let (time, degrees) = (s.time(), angle.to_degrees());
         let area = s.mesh.period.map_or(f64::NAN, |[x, y]| x * y);
         let plane = [[stress[0][0], stress[0][1]], [stress[1][0], stress[1][1]]];
-        let force = if s.mesh.period.is_some() { shear::normalised_force(plane, angle, area) } else { f64::NAN };
+        let work = s.energies().external;
+        let [before, done] = std::mem::replace(&mut self.last_shear, [angle, work]);
+        let turned = libm::sin(angle) - libm::sin(before);
+        let force = if s.mesh.period.is_none() {
+            f64::NAN
+        } else if turned.abs() > 1e-9 {
+            // the mean over the row: ∫ A₀ F_nor cos γ dγ is the external work
+            (work - done) / (area * turned)
+        } else {
+            shear::normalised_force(plane, angle, area)
+        };
         let reaction = s.reactions().iter().fold([0.0; 3], |sum, f| [0, 1, 2].map(|k| sum[k] + f[k]));
         let reaction = libm::sqrt(reaction.iter().map(|f| f * f).sum());
         let (e, h) = (*s.energies(), *s.health());

@@ -84,41 +84,53 @@ impl<R: Real> Surface<'_, R> {
         corners
     }
 
-    /// Walks from a face to the one closest to the slave. Ends on a face, or on the edge between two faces that each point to the other.
+    /// Walks from a face downhill in distance to the one closest to the slave. Of two faces whose common edge is closest, the
+    /// one that the slave is more in front of is taken: behind the other it need not be inside the body.
     #[inline(always)]
     pub fn walk(&self, slave: usize, body: usize, image: [i32; 2], from: Place) -> (Place, Corners<R>, Closest<R>) {
         let b = self.bodies[body];
         let one = R::from_f64(1.0);
         let mut place = from;
-        let mut before = from;
         let mut corners = self.corners(slave, body, image, place);
-        for _ in 0..8 {
-            let (xi, eta) = project(&corners.current);
-            let (over_xi, over_eta) = (xi.abs() - one, eta.abs() - one);
-            let zero = R::from_f64(0.0);
-            let mut next = place;
-            if over_eta > zero && over_eta >= over_xi {
-                next.ring += if eta > zero { 1 } else { -1 };
-            } else if over_xi > zero {
-                next.slice += if xi > zero { 1 } else { -1 };
-                if b.closed == 0 {
-                    next.slice = next.slice.clamp(0, b.slices as i32 - 1);
-                    if next == place && over_eta > zero {
-                        next.ring += if eta > zero { 1 } else { -1 };
-                    }
-                }
-            }
-            if next == place || next == before && place != from {
+        let mut point = closest(&corners.current);
+        for _ in 0..MOST_FACES {
+            if point.interior {
                 break;
             }
-            (before, place) = (place, next);
-            corners = self.corners(slave, body, image, place);
+            let mut moved = false;
+            for along_ring in [true, false] {
+                let coordinate = if along_ring { point.eta } else { point.xi };
+                if coordinate.abs() < one {
+                    continue;
+                }
+                let step = if coordinate > R::from_f64(0.0) { 1 } else { -1 };
+                let mut next = place;
+                if along_ring {
+                    next.ring += step;
+                } else {
+                    next.slice += step;
+                    if b.closed == 0 && !(0..b.slices as i32).contains(&next.slice) {
+                        continue;
+                    }
+                }
+                let next_corners = self.corners(slave, body, image, next);
+                let next_point = closest(&next_corners.current);
+                if next_point.better_than(&point) {
+                    (place, corners, point, moved) = (next, next_corners, next_point, true);
+                    break;
+                }
+            }
+            if !moved {
+                break;
+            }
         }
-        let closest = closest(&corners.current);
         place.ring = place.ring.rem_euclid(b.ring as i32);
-        (place, corners, closest)
+        (place, corners, point)
     }
 }
+
+/// Faces that a walk passes at most.
+const MOST_FACES: usize = 12;
 
 /// Middle and derivatives of a bilinear patch.
 #[inline(always)]
@@ -142,7 +154,7 @@ fn at<R: Real>(p: &[Vector<R>; 4], xi: R, eta: R) -> Vector<R> {
 
 /// Coordinates of the closest point of the unbounded patch to the origin, kept within ±2.
 #[inline(always)]
-pub fn project<R: Real>(q: &[Vector<R>; 4]) -> (R, R) {
+fn project<R: Real>(q: &[Vector<R>; 4]) -> (R, R) {
     let p = patch(q);
     let (zero, two) = (R::from_f64(0.0), R::from_f64(2.0));
     let (mut xi, mut eta) = (zero, zero);
@@ -200,11 +212,28 @@ pub fn closest<R: Real>(q: &[Vector<R>; 4]) -> Closest<R> {
 }
 
 impl<R: Real> Closest<R> {
+    /// Height of the slave above the face's tangent plane, mm.
+    #[inline(always)]
+    pub fn height(&self) -> R {
+        dot(self.offset, self.normal)
+    }
+
+    /// Whether this point is closer than another, or as close with the slave more in front of its face.
+    #[inline(always)]
+    fn better_than(&self, other: &Self) -> bool {
+        let tie = other.distance * R::from_f64(1e-4) + R::from_f64(1e-7);
+        if (self.distance - other.distance).abs() < tie {
+            self.height() > other.height() + tie
+        } else {
+            self.distance < other.distance
+        }
+    }
+
     /// Direction in which the slave is pushed, and signed distance of the slave point from the surface, mm; `None` where the
     /// point lies beside the border of a face it has passed under.
     #[inline(always)]
     pub fn normal_and_distance(&self) -> Option<(Vector<R>, R)> {
-        let height = dot(self.offset, self.normal);
+        let height = self.height();
         let zero = R::from_f64(0.0);
         if self.interior {
             return Some((self.normal, height));

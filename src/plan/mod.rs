@@ -105,7 +105,7 @@ pub struct Capacity {
 
 impl Default for Capacity {
     fn default() -> Self {
-        Self { cell: 96, slots: 4, beam_slots: 8 }
+        Self { cell: 96, slots: 6, beam_slots: 8 }
     }
 }
 
