@@ -12,7 +12,7 @@ use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::QUANTUM;
 use crate::kernel::stage::{Io, Kernel};
-use crate::kernel::vector::{add, dot, norm, scale, sub};
+use crate::kernel::vector::{add, norm, scale, sub};
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
@@ -72,6 +72,7 @@ impl Kernel for Candidates {
         for item in items {
             let slave = slaves[SLAVE * item] as usize;
             let own = slaves[SLAVE * item + 1];
+            let is_thread = own == EMPTY;
             let reach = values[SLAVE_VALUES * item + 1] + constant(f64::from(params.skin));
             let (position, height) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, slave);
             let mut found = [Best { key: EMPTY, in_front: (far, nowhere), behind: (far, nowhere) }; MOST];
@@ -124,10 +125,10 @@ impl Kernel for Candidates {
                         if point.distance > reach {
                             continue;
                         }
-                        let in_front = dot(point.offset, point.normal) >= constant(0.0);
+                        let in_front = point.height() >= constant(0.0) || is_thread && !point.interior;
                         if in_front {
                             best.in_front = nearer(best.in_front, (point.distance, place(ring)));
-                        } else if point.normal_and_distance().is_some() {
+                        } else if point.normal_and_distance(is_thread).is_some() {
                             best.behind = nearer(best.behind, (point.distance, place(ring)));
                         }
                     }

@@ -129,6 +129,45 @@ impl<R: Real> Surface<'_, R> {
     }
 }
 
+impl<R: Real> Surface<'_, R> {
+    /// The neighbouring face that is closer than the one a walk ended on, if there is one. A walk downhill ends inside a face,
+    /// but in a fold of a crushed surface a face that rises beside it can be closer; only one that rises can.
+    #[inline(always)]
+    pub fn closer_neighbour(
+        &self,
+        slave: usize,
+        body: usize,
+        image: [i32; 2],
+        place: Place,
+        point: &Closest<R>,
+    ) -> Option<Place> {
+        let b = self.bodies[body];
+        for (ring, slice) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
+            let next = Place { ring: place.ring + ring, slice: place.slice + slice };
+            if b.closed == 0 && !(0..b.slices as i32).contains(&next.slice) {
+                continue;
+            }
+            // the far edge of the neighbour
+            let far = |step: i32| i32::from(step > 0);
+            let ends = if ring != 0 {
+                [(next.ring + far(ring), next.slice), (next.ring + far(ring), next.slice + 1)]
+            } else {
+                [(next.ring, next.slice + far(slice)), (next.ring + 1, next.slice + far(slice))]
+            };
+            let mut rises = false;
+            for (ring, slice) in ends {
+                let (node, shift) = self.node(body, image, Place { ring, slice });
+                let above = add(self.from_slave(slave, node, shift).1, point.offset);
+                rises = rises || dot(above, point.normal) > R::from_f64(1e-4);
+            }
+            if rises && closest(&self.corners(slave, body, image, next).current).better_than(point) {
+                return Some(next);
+            }
+        }
+        None
+    }
+}
+
 /// Faces that a walk passes at most.
 const MOST_FACES: usize = 12;
 
@@ -230,21 +269,16 @@ impl<R: Real> Closest<R> {
     }
 
     /// Direction in which the slave is pushed, and signed distance of the slave point from the surface, mm; `None` where the
-    /// point lies beside the border of a face it has passed under.
+    /// point lies beside the border of a face it has passed under. The middle of a thread is never inside a body: if the
+    /// border is closest, it is outside, whatever side of the face's plane it is on.
     #[inline(always)]
-    pub fn normal_and_distance(&self) -> Option<(Vector<R>, R)> {
+    pub fn normal_and_distance(&self, is_thread: bool) -> Option<(Vector<R>, R)> {
         let height = self.height();
-        let zero = R::from_f64(0.0);
-        if self.interior {
+        if self.interior || self.distance < R::from_f64(1e-6) {
             return Some((self.normal, height));
         }
-        let tiny = self.distance < R::from_f64(1e-6);
-        if height >= zero {
-            return Some(if tiny {
-                (self.normal, height)
-            } else {
-                (scale(self.offset, R::from_f64(1.0) / self.distance), self.distance)
-            });
+        if is_thread || height >= R::from_f64(0.0) {
+            return Some((scale(self.offset, R::from_f64(1.0) / self.distance), self.distance));
         }
         (-height > R::from_f64(0.7) * self.distance).then_some((self.normal, -self.distance))
     }

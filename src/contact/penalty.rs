@@ -44,6 +44,9 @@ const FORCE: usize = 12;
 const STIFFNESS: usize = 13;
 const STATUS: usize = 14;
 
+/// Gap, mm, below which a thread looks for closer faces in folds.
+const NEAR: f64 = 0.01;
+
 /// Contact forces of slave nodes.
 pub struct Penalty;
 
@@ -72,6 +75,7 @@ impl Kernel for Penalty {
         let (forces, stiffness, flags) = (io.atomics(FORCE), io.atomics(STIFFNESS), io.atomic_uints(STATUS));
         let elapsed = io.row.dt_mid + io.row.dt_mid - io.row.dt;
         let per_step = constant(2.0) / io.row.dt;
+        let near = constant(NEAR);
         for item in items {
             let slot_keys = keys.item(0, item);
             if slot_keys[0] == EMPTY {
@@ -92,12 +96,18 @@ impl Kernel for Penalty {
                 }
                 let (body, image) = of_key(at[0]);
                 let from = Place { ring: at[1] as i32, slice: at[2] as i32 };
-                let (place, corners, point) = surface.walk(slave, body, image, from);
+                let (mut place, mut corners, mut point) = surface.walk(slave, body, image, from);
+                if is_thread && point.distance < radius + near {
+                    for _ in 0..2 {
+                        let Some(next) = surface.closer_neighbour(slave, body, image, place, &point) else { break };
+                        (place, corners, point) = surface.walk(slave, body, image, next);
+                    }
+                }
                 (at[1], at[2]) = (place.ring as u32, place.slice as u32);
                 let state = &mut slot_states[SLOT_STATE * slot..][..SLOT_STATE];
                 let elastic = [state[0], state[1], state[2]];
                 let tangential = penalty * real(params.tangential);
-                let touch = point.normal_and_distance().filter(|(_, distance)| {
+                let touch = point.normal_and_distance(is_thread).filter(|(_, distance)| {
                     let gap = *distance - radius;
                     gap < zero && -*distance < real(params.depth)
                 });
