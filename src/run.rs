@@ -479,12 +479,7 @@ impl<'a> Run<'a> {
 }
 
 fn draw(mesh: &Mesh, frame: &Frame, title: &str, field: Option<&str>, width: usize, path: &Path) -> Result<()> {
-    let title = if frame.angle_deg == 0.0 {
-        format!("{title}, t = {:.2} ms", 1e3 * frame.time)
-    } else {
-        format!("{title}, {:.1}°", frame.angle_deg)
-    };
-    let view = View { field: field.map(str::to_owned), width_px: width, title, ..View::default() };
+    let view = View { field: field.map(str::to_owned), width_px: width, title: title.into(), ..View::default() };
     render(mesh, frame, &view)?.write_png(path)
 }
 

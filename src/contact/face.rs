@@ -196,15 +196,7 @@ impl<R: Real> Surface<'_, R> {
 
     /// Adds a face if it is within reach; says whether it is.
     #[inline(always)]
-    fn add_near(
-        &self,
-        near: &mut Near<R>,
-        slave: usize,
-        body: usize,
-        image: [i32; 2],
-        place: Place,
-        reach: R,
-    ) -> bool {
+    fn add_near(&self, near: &mut Near<R>, slave: usize, body: usize, image: [i32; 2], place: Place, reach: R) -> bool {
         if near.count == MOST_TOUCHED {
             return false;
         }
@@ -221,15 +213,7 @@ impl<R: Real> Surface<'_, R> {
     /// Whether the far edge of a neighbouring face lies above the plane of the closest point: only then can the neighbour be
     /// nearer than their common edge.
     #[inline(always)]
-    fn rises(
-        &self,
-        slave: usize,
-        body: usize,
-        image: [i32; 2],
-        place: Place,
-        next: Place,
-        point: &Closest<R>,
-    ) -> bool {
+    fn rises(&self, slave: usize, body: usize, image: [i32; 2], place: Place, next: Place, point: &Closest<R>) -> bool {
         let (ring, slice) = (next.ring - place.ring, next.slice - place.slice);
         let far = |step: i32| i32::from(step > 0);
         let ends = if ring != 0 {
