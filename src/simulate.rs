@@ -14,7 +14,7 @@ use crate::elements::hex8::LANES;
 use crate::error::{Error, Guard, Result};
 use crate::kernel::buffer::Buffer;
 use crate::kernel::lane::Isa;
-use crate::kernel::position::QUANTUM;
+use crate::kernel::position::{QUANTUM, quanta};
 use crate::mesh::Mesh;
 use crate::mesh::frame::{Field, Frame};
 use crate::plan::{self, Capacity, Model};
@@ -707,6 +707,25 @@ impl Simulation {
         let nodes = self.mesh.nodes.len();
         let v = self.backend.scalars(self.model.buffers.velocity);
         (0..nodes).map(|n| [0, 1, 2].map(|k| v[n + k * nodes])).collect()
+    }
+
+    /// Replaces the velocity of every node, mm/s.
+    pub fn set_velocities(&mut self, velocities: &[[f64; 3]]) {
+        let planes: [Vec<f64>; 3] = [0, 1, 2].map(|k| velocities.iter().map(|v| v[k]).collect());
+        self.backend.set_scalars(self.model.buffers.velocity, &planes.concat());
+    }
+
+    /// Replaces the displacement of every node relative to F̄X, mm. What contact remembers stays as it is.
+    pub fn set_fluctuations(&mut self, displacements: &[[f64; 3]]) {
+        let planes: [Vec<f64>; 3] = [0, 1, 2].map(|k| displacements.iter().map(|w| w[k]).collect());
+        let planes = planes.concat();
+        let whole: Vec<i32> = match self.make.precision {
+            Precision::F32 => planes.iter().map(|w| quanta(*w)).collect(),
+            Precision::F64 => vec![0; planes.len()],
+        };
+        let rest: Vec<f64> = planes.iter().zip(&whole).map(|(w, q)| w - f64::from(*q) * QUANTUM).collect();
+        self.backend.set_bytes(self.model.buffers.quanta, bytemuck::cast_slice(&whole));
+        self.backend.set_scalars(self.model.buffers.remainder, &rest);
     }
 
     /// Sum of the forces that the scene exerts on its prescribed components, N.

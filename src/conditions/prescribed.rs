@@ -12,6 +12,8 @@ use std::ops::Range;
 pub struct Params {
     /// First node of a thread.
     pub first_thread: u32,
+    /// Gravity, mm/s², which the integration adds to every node.
+    pub gravity: [f32; 3],
 }
 
 /// Node and mask of components (bit k for component k), 2 numbers a condition.
@@ -35,7 +37,7 @@ pub struct Hold;
 impl Kernel for Prescribed {
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { first_thread } = io.params();
+        let Params { first_thread, gravity } = io.params();
         let (nodes, targets, velocity, mass) =
             (io.uints(NODES), io.scalars(TARGETS), io.scalars(VELOCITY), io.scalars(MASS));
         let plane = mass.len();
@@ -56,7 +58,7 @@ impl Kernel for Prescribed {
                 let (place, v) = (node + k * plane, velocity[node + k * plane]);
                 let force = acceleration.get(place) / inverse.get(node);
                 let target = targets[3 * item + k] * row.motion;
-                let a = (target - v * keep) / gain;
+                let a = (target - v * keep) / gain - L::Scalar::from_f64(f64::from(gravity[k]));
                 acceleration.set(place, a);
                 let mean = (v + target) * L::Scalar::from_f64(0.5);
                 // a node that is held altogether carries no added mass

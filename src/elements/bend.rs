@@ -1,7 +1,8 @@
 //! Bending between two consecutive beams, without rotational unknowns: E = (2 EI/l̄)(T − T₀)², T = tan(θ/2) of the turning
 //! angle θ, l̄ the mean length of the two beams. T = |t₁ × t₂|/(1 + t₁·t₂) is smoothed to √(T² + T_ε²), since its gradient has no
-//! direction for a straight thread with a curved rest state. Only the size of the rest curvature is kept, not its plane: a
-//! thread has no torsional stiffness here.
+//! direction for a straight thread with a curved rest state. A bend that is straight at rest needs no smoothing, and must have
+//! none: it would lose its stiffness. Only the size of the rest curvature is kept, not its plane: a thread has no torsional
+//! stiffness here.
 
 use super::beam2::{TABLE, add_virial, vector};
 use crate::kernel::lane::{Lane, Real};
@@ -12,7 +13,8 @@ use std::ops::Range;
 
 /// Numbers of a bend in the table: 2 EI/l̄ in N·mm, smoothed rest value of T.
 pub const BEND: usize = 2;
-/// Smoothing T_ε of tan(θ/2): 0.6 degrees of turning.
+/// Largest smoothing T_ε of tan(θ/2): 0.6 degrees of turning. It is at most half the smoothed rest value, so that the stiffness of a
+/// straightened bend is never below minus that of a straight one.
 pub const SMOOTHING: f64 = 0.005;
 
 /// Beams `[2]` of each bend.
@@ -32,9 +34,9 @@ const VIRIAL: usize = 8;
 /// Bending forces; with `PERIODIC`, also their part of the homogenised stress.
 pub struct Bend<const PERIODIC: bool>;
 
-/// √(T² + T_ε²).
+/// √(T² + T_ε²) of a rest value T, with T_ε the smaller of [`SMOOTHING`] and half the result.
 pub fn smoothed(t: f64) -> f64 {
-    libm::sqrt(t * t + SMOOTHING * SMOOTHING)
+    libm::sqrt(t * t + SMOOTHING * SMOOTHING).min(t * 2.0 / libm::sqrt(3.0))
 }
 
 impl<const PERIODIC: bool> Kernel for Bend<PERIODIC> {
@@ -64,7 +66,9 @@ impl<const PERIODIC: bool> Kernel for Bend<PERIODIC> {
             // a thread folded onto itself: tan(θ/2) ends at 10
             let opening = (constant(1.0) + cosine).max(constant(0.02));
             let turned = cross(tangent[0], tangent[1]);
-            let t = (dot(turned, turned) / (opening * opening) + constant(SMOOTHING * SMOOTHING)).sqrt();
+            let smoothing = constant(SMOOTHING).min(constant(0.5) * rest);
+            let t = (dot(turned, turned) / (opening * opening) + smoothing * smoothing).sqrt();
+            let t = t.max(constant(1e-12));
             let slope = constant(-2.0) * stiffness * (constant(1.0) - rest / t) / (opening * opening);
             let g = [
                 scale(sub(tangent[1], scale(tangent[0], cosine)), slope * inverse[0]),

@@ -341,6 +341,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     b.plan.step.push(assembly);
 
     // conditions
+    let gravity = effects.gravity_mm_s2.unwrap_or_default().map(|g| g as f32);
     let conditions = conditions(case, mesh)?;
     let (mut reaction, mut reaction_work, mut condition_nodes) = (None, None, None);
     if !conditions.0.is_empty() {
@@ -352,7 +353,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         let reads = [at, targets, velocity, mass];
         let writes =
             [(acceleration, Access::Scatter), (inverse_mass, Access::Scatter), (done, own(1, 1)), (force, own(1, 3))];
-        let params = prescribed::Params { first_thread };
+        let params = prescribed::Params { first_thread, gravity };
         b.plan.step.push(after::<prescribed::Prescribed>("prescribed", count, NODE_GRAIN, &reads, &writes, params));
     }
 
@@ -380,12 +381,11 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     }
 
     // motion
-    let gravity = effects.gravity_mm_s2;
-    let params = integrate::Params { first_thread, unused: 0, gravity: gravity.unwrap_or_default().map(|g| g as f32) };
+    let params = integrate::Params { first_thread, unused: 0, gravity };
     let reads = [acceleration, mass, correction, inverse_mass];
     let writes = [(velocity, own(3, 1)), (quanta_, own(3, 1)), (remainder, own(3, 1)), (work, own(3, 1))];
     let lines = effects.fibre_lines.is_some();
-    b.plan.step.push(match (lines, gravity.is_some()) {
+    b.plan.step.push(match (lines, effects.gravity_mm_s2.is_some()) {
         (true, true) => {
             after::<integrate::Integrate<true, true>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params)
         }
