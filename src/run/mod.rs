@@ -120,6 +120,8 @@ struct Run<'a> {
     frames: Vec<(f64, String)>,
     pictures: Vec<PathBuf>,
     curve: Vec<(f64, f64)>,
+    /// Largest prescribed displacement, mm.
+    reach: f64,
     /// Shear angle (rad) and external work (mJ) at the last row.
     last_shear: [f64; 2],
     settled: Option<yarns::Sizes>,
@@ -129,6 +131,13 @@ struct Run<'a> {
     largest_added: [f64; 2],
     dt_range: [f64; 2],
     started: Instant,
+}
+
+/// Largest displacement that a domain prescribes, mm.
+fn reach(domain: &Domain) -> f64 {
+    let Domain::Mesh(inline) = domain else { return 0.0 };
+    let size = |d: &[f64; 3]| libm::sqrt(d.iter().map(|c| c * c).sum());
+    inline.conditions.iter().map(|c| size(&c.displacement_mm)).fold(0.0, f64::max)
 }
 
 /// Angle after which the kinetic energy of shear is judged, degrees.
@@ -173,6 +182,7 @@ impl<'a> Run<'a> {
             frames: Vec::new(),
             pictures: Vec::new(),
             curve: Vec::new(),
+            reach: reach(&loaded.case.domain),
             last_shear: [0.0; 2],
             settled: None,
             settled_weft: None,
@@ -299,7 +309,7 @@ impl<'a> Run<'a> {
             phase.into(),
             s.dt().into(),
             degrees.into(),
-            motion.into(),
+            (motion * self.reach).into(),
             reaction.into(),
             force.into(),
             e.internal().into(),
