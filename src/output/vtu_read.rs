@@ -25,6 +25,9 @@ pub fn read(path: &Path, mesh: &Mesh) -> Result<Frame> {
             format!("{what} cannot be read: not a whole frame written by this version of tricot, run its case again");
         Error::file(path, message)
     };
+    if !text.trim_end().ends_with("</VTKFile>") {
+        return Err(broken("its end"));
+    }
     let info = arrays(&text, "FieldData");
     let numbers = |name: &str, count: usize| {
         let values = info.iter().find(|a| a.name == name).and_then(Array::values);
@@ -219,7 +222,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (mesh, _, path) = written(folder.path());
         let error = |mesh: &Mesh| {
-            let error = read(&path, mesh).unwrap_err();
+            let error = read(&path, mesh).err().expect("it is refused");
             assert_eq!(error.exit_code(), 4);
             error.to_string()
         };
