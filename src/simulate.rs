@@ -849,7 +849,7 @@ fn widen(old: &[u8], old_len: usize, fresh: &[u8], model: &Model, name: &str) ->
     let mut new = fresh.to_vec();
     let new_len = model.plan.buffers.iter().find(|d| d.name == name).map_or(0, |d| d.len);
     let items = if name.starts_with("beam pair") { model.beams.len() } else { model.slaves.len() };
-    if items == 0 || old_len % items != 0 || new_len % items != 0 {
+    if items == 0 || !old_len.is_multiple_of(items) || !new_len.is_multiple_of(items) {
         return new;
     }
     let (old_row, new_row) = (old.len() / items, new.len() / items);

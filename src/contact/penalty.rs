@@ -67,7 +67,7 @@ impl Kernel for Penalty {
         let constant = L::Scalar::from_f64;
         let zero = constant(0.0);
         let surface = Surface {
-            bodies: bytemuck::cast_slice(&io.uints(BODIES)[..]),
+            bodies: bytemuck::cast_slice(io.uints(BODIES)),
             ring_lines: io.uints(RING_LINES),
             reference: Lattice::new(io, REFERENCE),
             displacement: Displacements::new(io, QUANTA, REMAINDER),
