@@ -114,7 +114,7 @@ pub struct Health {
     pub worst_hex: usize,
     /// Largest penetration of threads into yarns, of yarns, of threads, mm, since the last window.
     pub penetration: [f64; 3],
-    /// Slave nodes and beams in contact: threads on yarns, yarns, threads.
+    /// Slave nodes and beams in contact, mean over the last window: threads on yarns, yarns, threads.
     pub touching: [u32; 3],
     /// Relative error of the energy balance.
     pub balance: f64,
@@ -142,6 +142,8 @@ pub struct Simulation {
     dt: f64,
     dt_before: f64,
     searches: u64,
+    /// Step of the last look at energies and limits.
+    diagnosed: u64,
     gradient_at_search: Load,
     energies: Energies,
     start_energy: f64,
@@ -207,6 +209,7 @@ impl Simulation {
             dt: 0.0,
             dt_before: 0.0,
             searches: 0,
+            diagnosed: 0,
             energies: Energies::default(),
             start_energy: 0.0,
             largest_flow: 0.0,
@@ -519,7 +522,8 @@ impl Simulation {
         self.health.limiting_node = node;
         (self.health.min_jacobian, self.health.worst_hex) = self.worst_jacobian();
         self.health.penetration = status::PENETRATION.map(|p| f64::from(f32::from_bits(status[p])));
-        let steps = (WINDOW * BURST) as u32;
+        let steps = (self.step - self.diagnosed).max(1) as u32;
+        self.diagnosed = self.step;
         self.health.touching = status::TOUCHING.map(|p| status[p] / steps);
         let mut cleared = status;
         for place in [status::CONTACT_RATE].into_iter().chain(status::PENETRATION).chain(status::TOUCHING) {

@@ -6,7 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Files and folders that a run writes; pictures (`*.png`) and meshes (`*.vtu`, `*.inp`) come on top.
-const OWN: [&str; 13] = [
+const OWN: [&str; 15] = [
+    "contacts.csv",
+    "yarns_each.csv",
     "stress.csv",
     "history.csv",
     "energies.csv",

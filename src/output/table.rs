@@ -25,6 +25,35 @@ pub const HISTORY: &[&str] = &[
     "min_jacobian",
 ];
 
+/// Columns of `contacts.csv`: nodes and beams that touch, deepest penetration since the row before, mass added by contact over
+/// true mass, and the estimated limit of the time step.
+pub const CONTACTS: &[&str] = &[
+    "time_s",
+    "shear_angle_deg",
+    "thread_nodes_on_yarns",
+    "yarn_nodes_on_yarns",
+    "beams_on_beams",
+    "thread_yarn_penetration_mm",
+    "yarn_yarn_penetration_mm",
+    "thread_thread_penetration_mm",
+    "added_mass_yarns",
+    "added_mass_threads",
+    "dt_limit_s",
+];
+
+/// Columns of `yarns_each.csv`: means over the stations of one yarn.
+pub const YARNS_EACH: &[&str] = &[
+    "time_s",
+    "shear_angle_deg",
+    "yarn",
+    "width_mm",
+    "thickness_mm",
+    "gap_mm",
+    "broadness_mm",
+    "width_min_mm",
+    "width_max_mm",
+];
+
 /// Columns of `yarns.csv`: means over the stations of a ply, then their standard deviations.
 pub const YARNS: &[&str] = &[
     "time_s",
@@ -41,6 +70,8 @@ pub const YARNS: &[&str] = &[
     "weft_width_std_mm",
     "weft_thickness_std_mm",
     "weft_gap_std_mm",
+    "warp_broadness_mm",
+    "weft_broadness_mm",
 ];
 
 /// Columns of `stitches.csv`.

@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::fabric;
 use crate::measure::{shear, stitches, yarns};
 use crate::mesh::{Mesh, Ply};
-use crate::output::table::{HISTORY, STITCHES, Table, YARNS};
+use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH};
 use crate::output::{directory, file, vtu};
 use crate::simulate::{Make, Simulation};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -99,7 +99,7 @@ pub fn run(loaded: &Loaded, options: &Options) -> Result<Outcome> {
     write_case(&loaded.case, &options.output)?;
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
-    // a second run in one process keeps the first handler, which is as good
+    // only the first run of a process can be interrupted: the handler cannot be replaced
     let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
     let mut run = Run::new(&loaded, options, simulation, stopped)?;
     let result = run.go();
@@ -115,7 +115,8 @@ struct Run<'a> {
     history: Table,
     energies: Table,
     stress: Table,
-    yarns: Option<Table>,
+    contacts: Table,
+    yarns: Option<[Table; 2]>,
     stitches: Option<Table>,
     frames: Vec<(f64, String)>,
     pictures: Vec<PathBuf>,
@@ -175,7 +176,13 @@ impl<'a> Run<'a> {
             history: Table::create(&dir.join("history.csv"), HISTORY)?,
             energies: Table::create(&dir.join("energies.csv"), &energies)?,
             stress: Table::create(&dir.join("stress.csv"), &STRESS)?,
-            yarns: if plies { Some(Table::create(&dir.join("yarns.csv"), YARNS)?) } else { None },
+            contacts: Table::create(&dir.join("contacts.csv"), CONTACTS)?,
+            yarns: if plies {
+                let all = Table::create(&dir.join("yarns.csv"), YARNS)?;
+                Some([all, Table::create(&dir.join("yarns_each.csv"), YARNS_EACH)?])
+            } else {
+                None
+            },
             stitches: if threads { Some(Table::create(&dir.join("stitches.csv"), STITCHES)?) } else { None },
             simulation,
             stopped,
@@ -323,13 +330,31 @@ impl<'a> Run<'a> {
         let numbers: Vec<f64> =
             [time, degrees].into_iter().chain(stress.concat().into_iter().map(|p| p / area)).collect();
         self.stress.numbers(&numbers)?;
-        if let Some(table) = &mut self.yarns {
+        let counts = h.touching.map(f64::from);
+        let numbers: Vec<f64> = [&[time, degrees][..], &counts, &h.penetration, &h.added_mass, &[h.dt_limit]].concat();
+        self.contacts.numbers(&numbers)?;
+        if let Some([table, each]) = &mut self.yarns {
             let yarns = yarns::measure(&s.mesh, &s.frame())?;
-            let [warp, weft] = [Ply::Warp, Ply::Weft].map(|ply| yarns::ply(&yarns, ply));
-            let means = [&warp, &weft].map(|p| [p.width.mean, p.thickness.mean, p.gap.mean]);
-            let spreads = [&warp, &weft].map(|p| [p.width.std, p.thickness.std, p.gap.std]);
-            let numbers: Vec<f64> = [time, degrees].into_iter().chain(means.concat()).chain(spreads.concat()).collect();
+            let plies = [Ply::Warp, Ply::Weft].map(|ply| yarns::ply(&yarns, ply));
+            let means = plies.map(|p| [p.width.mean, p.thickness.mean, p.gap.mean]);
+            let spreads = plies.map(|p| [p.width.std, p.thickness.std, p.gap.std]);
+            let broadness = plies.map(|p| p.broadness.mean);
+            let numbers = [&[time, degrees][..], &means.concat(), &spreads.concat(), &broadness].concat();
             table.numbers(&numbers)?;
+            for yarn in &yarns {
+                let sizes = yarn.sizes();
+                each.row(&[
+                    time.into(),
+                    degrees.into(),
+                    s.mesh.blocks[yarn.block].name.as_str().into(),
+                    sizes.width.mean.into(),
+                    sizes.thickness.mean.into(),
+                    sizes.gap.mean.into(),
+                    sizes.broadness.mean.into(),
+                    sizes.width.min.into(),
+                    sizes.width.max.into(),
+                ])?;
+            }
         }
         if let Some(table) = &mut self.stitches {
             let t = stitches::measure(&s.mesh, &s.tensions())?;
