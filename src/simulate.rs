@@ -15,6 +15,8 @@ use crate::error::{Error, Guard, Result};
 use crate::kernel::buffer::Buffer;
 use crate::kernel::lane::Isa;
 use crate::kernel::position::{QUANTUM, quanta};
+use crate::kernel::row::Row;
+use crate::kernel::stage::Stage;
 use crate::mesh::Mesh;
 use crate::mesh::frame::{Field, Frame};
 use crate::plan::{self, Capacity, Model};
@@ -29,6 +31,8 @@ const WINDOW: u64 = 8;
 const SKIN_USED: f64 = 0.35;
 /// Length over which the affine motion between two searches is counted, mm.
 const AFFINE_REACH: f64 = 2.0;
+/// Speeds may grow by this factor during a burst.
+const SPEED_MARGIN: f64 = 2.0;
 /// Step that a run starts with, as a share of the limit: legs that start crushed need it while they relax.
 const FIRST_SHARE: f64 = 0.4;
 /// Time over which the first share grows to one, s.
@@ -142,6 +146,8 @@ pub struct Simulation {
     dt: f64,
     dt_before: f64,
     searches: u64,
+    /// Largest speed of a node after the last burst, mm/s.
+    speed: f64,
     /// Step of the last look at energies and limits.
     diagnosed: u64,
     gradient_at_search: Load,
@@ -209,6 +215,7 @@ impl Simulation {
             dt: 0.0,
             dt_before: 0.0,
             searches: 0,
+            speed: 1e9,
             diagnosed: 0,
             energies: Energies::default(),
             start_energy: 0.0,
@@ -291,8 +298,27 @@ impl Simulation {
         self.choose_dt();
         self.dt_before = self.dt;
         self.energies = self.state_energies();
+        self.energies.contact = self.contact_at_rest();
         self.start_energy = self.energies.output();
         Ok(())
+    }
+
+    /// Elastic energy of bodies that overlap at the start: the contact stages once, over no time, without effect.
+    fn contact_at_rest(&mut self) -> f64 {
+        let b = self.model.buffers.clone();
+        let (Some(force), Some(stiffness)) = (b.contact_force, b.contact_stiffness) else { return 0.0 };
+        let contact = |stage: &&Stage| stage.writes.iter().any(|(buffer, _)| *buffer == force) && !stage.waits;
+        let stages: Vec<Stage> = self.model.plan.step.iter().filter(contact).cloned().collect();
+        let row = self.schedule.row(self.time, 1e-12, 1e-12);
+        self.backend.run(&stages, &[row]);
+        let mut energy = 0.0;
+        for buffer in [b.contact_sums, b.pair_sums].into_iter().flatten() {
+            energy += self.take(buffer).chunks_exact(penalty::SUMS).map(|s| s[penalty::SUM_ENERGY]).sum::<f64>();
+        }
+        for buffer in [force, stiffness, b.status] {
+            self.backend.clear(buffer);
+        }
+        energy
     }
 
     /// Some steps, then a search if the skin is used up.
@@ -300,7 +326,10 @@ impl Simulation {
         let mut rows = Vec::with_capacity(steps as usize);
         let mut time = self.time;
         for _ in 0..steps {
-            rows.push(self.schedule.row(time, self.dt, self.dt_before));
+            let row = self.schedule.row(time, self.dt, self.dt_before);
+            let affine = row.rate.as_flattened().iter().fold(0.0, |most: f64, r| most.max(r.abs()));
+            let approach = 2.0 * SPEED_MARGIN * self.speed + 2.0 * affine * AFFINE_REACH;
+            rows.push(Row { approach, ..row });
             self.dt_before = self.dt;
             time += self.dt;
         }
@@ -310,6 +339,7 @@ impl Simulation {
         self.backend.run(&self.model.plan.watch, &rows[..1]);
         let status = self.backend.uints(self.model.buffers.status);
         self.check_flags(status[status::FLAGS])?;
+        self.speed = f64::from(f32::from_bits(status[status::SPEED]));
         let travel = f64::from(f32::from_bits(status[status::TRAVEL]));
         let load = self.load();
         let affine = (load.angle - self.gradient_at_search.angle).abs() * AFFINE_REACH;
@@ -379,7 +409,7 @@ impl Simulation {
 
     fn clear_travel(&mut self, status: &[u32]) {
         let mut bytes = bytemuck::cast_slice::<u32, u8>(status).to_vec();
-        for place in [status::FLAGS, status::TRAVEL] {
+        for place in [status::FLAGS, status::TRAVEL, status::SPEED] {
             bytes[4 * place..][..4].fill(0);
         }
         // flags that stop the run stay
@@ -822,7 +852,7 @@ impl Simulation {
             let normal: f64 = (0..slots)
                 .map(|s| item * slots + s)
                 .filter(|s| keys[s * penalty::SLOT_KEYS] != EMPTY)
-                .map(|s| state[s * penalty::SLOT_STATE + 3])
+                .map(|s| state[s * penalty::SLOT_STATE + 3].max(0.0))
                 .sum();
             force[slave.node] = normal;
             slip[slave.node] = self.slip[item];

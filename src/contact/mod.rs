@@ -90,6 +90,8 @@ pub mod status {
     pub const CONTACT_RATE: usize = 5;
     /// Nodes and beams that touch something.
     pub const TOUCHING: [usize; 3] = [6, 7, 8];
+    /// Largest speed of a node, bits of an f32, mm/s.
+    pub const SPEED: usize = 9;
     /// Size of the buffer.
     pub const SIZE: usize = 16;
 

@@ -1,4 +1,5 @@
-//! Penalty contact of slave nodes with the surfaces of yarns, every step, for the candidates of each slave.
+//! Penalty contact of slave nodes with the surfaces of yarns, every step, for the candidates of each slave that can touch: one
+//! with a gap is left alone until the gap can have closed at the largest speed there is.
 
 use super::face::{Place, Surface};
 use super::friction::slide;
@@ -16,7 +17,7 @@ pub const SLAVE: usize = 2;
 pub const SLAVE_VALUES: usize = 2;
 /// Integers of a slot: key, ring position, slice.
 pub const SLOT_KEYS: usize = 3;
-/// Numbers of a slot: elastic tangential displacement, mm (3); normal force, N.
+/// Numbers of a slot: elastic tangential displacement, mm (3); normal force, N, or less what is sure to be left of the gap, mm.
 pub const SLOT_STATE: usize = 4;
 /// Sums of a slave over steps: work lost to friction, to contact damping, work of the growing radius, mJ; slip, mm; then
 /// force ⊗ ΔX, N·mm (9). Fourteenth: elastic energy now, mJ.
@@ -92,6 +93,7 @@ impl Kernel for Penalty {
             let is_thread = slaves[SLAVE * item + 1] == EMPTY;
             let (penalty, full_radius) = (values[SLAVE_VALUES * item], values[SLAVE_VALUES * item + 1]);
             let radius = full_radius * io.row.radius;
+            let closing = io.row.approach * elapsed + full_radius * io.row.radius_increment;
             let slot_states = states.item(0, item);
             let sum = sums.item(0, item);
             let mut energy = zero;
@@ -102,10 +104,16 @@ impl Kernel for Penalty {
                     break;
                 }
                 let (body, image) = of_key(at[0]);
+                let state = &mut slot_states[SLOT_STATE * slot..][..SLOT_STATE];
+                if state[3] < zero {
+                    state[3] = state[3] + closing;
+                    if state[3] < zero {
+                        continue;
+                    }
+                }
                 let from = Place { ring: at[1] as i32, slice: at[2] as i32 };
                 let (place, corners, point) = surface.walk(slave, body, image, from);
                 (at[1], at[2]) = (place.ring as u32, place.slice as u32);
-                let state = &mut slot_states[SLOT_STATE * slot..][..SLOT_STATE];
                 let elastic = [state[0], state[1], state[2]];
                 let tangential = penalty * real(params.tangential);
                 let (near, single);
@@ -159,7 +167,9 @@ impl Kernel for Penalty {
                 let size = norm(push);
                 let Some((motion, apart, masters)) = first.filter(|_| size > zero) else {
                     sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
-                    state.fill(zero);
+                    // a point behind a face keeps being looked at
+                    let gap = if is_thread || point.height() > zero { point.distance - radius } else { zero };
+                    state.copy_from_slice(&[zero, zero, zero, -gap.max(zero)]);
                     continue;
                 };
                 touches = true;

@@ -1,9 +1,11 @@
-//! How far nodes have moved since the last search, and whether they are still numbers.
+//! How far nodes have moved since the last search, how fast they are, and whether they are still numbers.
 
 use super::status;
 use crate::kernel::lane::{Lane, Real};
+use crate::kernel::node::Field;
 use crate::kernel::position::difference;
 use crate::kernel::stage::{Io, Kernel, raise};
+use crate::kernel::vector::dot;
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
@@ -12,10 +14,11 @@ pub const REMAINDER: usize = 1;
 /// Displacements at the last search.
 pub const SEARCH_QUANTA: usize = 2;
 pub const SEARCH_REMAINDER: usize = 3;
+pub const VELOCITY: usize = 4;
 
 /// Notes displacements at a search.
 pub struct Remember;
-/// Raises the largest distance travelled since.
+/// Raises the largest distance travelled since, and the largest speed.
 pub struct Travel;
 
 impl Kernel for Remember {
@@ -37,12 +40,13 @@ impl Kernel for Remember {
 impl Kernel for Travel {
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        const STATUS: usize = 4;
+        const STATUS: usize = 5;
         let (quanta, remainder) = (io.ints(QUANTA), io.scalars(REMAINDER));
         let (search_quanta, search_remainder) = (io.ints(SEARCH_QUANTA), io.scalars(SEARCH_REMAINDER));
         let status = io.atomic_uints(STATUS);
         let plane = remainder.len() / 3;
-        let mut largest = L::Scalar::from_f64(0.0);
+        let velocity = Field::new(io, VELOCITY);
+        let (mut largest, mut fastest) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(0.0));
         for node in items {
             let mut square = L::Scalar::from_f64(0.0);
             for k in 0..3 {
@@ -54,7 +58,10 @@ impl Kernel for Travel {
                 status[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
             }
             largest = largest.max(square);
+            let v = velocity.at(node);
+            fastest = fastest.max(dot(v, v));
         }
         raise(&status[status::TRAVEL], largest.sqrt());
+        raise(&status[status::SPEED], fastest.sqrt());
     }
 }

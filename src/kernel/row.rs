@@ -29,7 +29,9 @@ pub struct Row<R> {
     pub damping_thread: R,
     /// Acceleration of the amplitude of prescribed motion, 1/s².
     pub motion: R,
-    pub reserved: [R; 5],
+    /// Bound on how fast two near bodies can approach each other, mm/s.
+    pub approach: R,
+    pub reserved: [R; 4],
 }
 
 impl Row<f64> {
@@ -48,6 +50,7 @@ impl Row<f64> {
             damping_solid: r(self.damping_solid),
             damping_thread: r(self.damping_thread),
             motion: r(self.motion),
+            approach: r(self.approach),
             reserved: self.reserved.map(r),
         }
     }

@@ -85,6 +85,8 @@ pub struct Buffers {
     pub beam_virial: Option<Buffer>,
     pub bend_energy: Option<Buffer>,
     pub bend_virial: Option<Buffer>,
+    pub contact_force: Option<Buffer>,
+    pub contact_stiffness: Option<Buffer>,
     pub contact_sums: Option<Buffer>,
     pub contact_keys: Option<Buffer>,
     pub contact_state: Option<Buffer>,
@@ -269,7 +271,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let element_limit = b.scratch("element stiffness of nodes", 2 * nodes);
     let search_quanta = b.add("quanta at the last search", Kind::Int, 3 * nodes, true, Initial::Zero);
     let search_remainder = b.add("remainder at the last search", Kind::Scalar, 3 * nodes, true, Initial::Zero);
-    let reads = [quanta_, remainder, search_quanta, search_remainder];
+    let reads = [quanta_, remainder, search_quanta, search_remainder, velocity];
     let writes = [(status_, Access::Atomic)];
     b.plan.watch.push(after::<travel::Travel>("travel", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0]));
 
@@ -428,6 +430,8 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             beam_virial,
             bend_energy,
             bend_virial,
+            contact_force: contact.as_ref().map(|c| c.force),
+            contact_stiffness: contact.as_ref().map(|c| c.stiffness),
             contact_sums: contact.as_ref().and_then(|c| c.faces.map(|f| f.sums)),
             contact_keys: contact.as_ref().and_then(|c| c.faces.map(|f| f.keys)),
             contact_state: contact.as_ref().and_then(|c| c.faces.map(|f| f.state)),
