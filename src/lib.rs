@@ -1,4 +1,68 @@
 //! Explicit finite elements for dry stitched non-crimp fabrics at the scale of their yarns.
+//!
+//! # What is solved
+//! Yarns are hexahedra of a fibre-bundle law, stitching threads are chains of beams, and everything may touch everything.
+//! In a periodic cell the deformation gradient F̄(t) of the fabric is prescribed, and the unknown is the fluctuation w:
+//!
+//! ```text
+//! x = F̄ X + w,   w periodic                                positions (w = displacement in a free scene, F̄ = I)
+//! M ẅ = −∫ P(F) : ∇N dV + f_thread + f_contact − α M ẇ      motion, integrated by central differences
+//! P = ∂W/∂F,   W = elongation + compaction + distortion + longitudinal shear        yarns (Charmetant et al.)
+//! N = EA (l/L₀ − 1 − ε_th),   E_bend = (2 EI/l̄)(tan θ/2 − T₀)²                      threads
+//! f_n = k · penetration,   |f_t| ≤ μ f_n with true stick                            contact
+//! P̄ = (1/V) ∂W/∂F̄ by virtual power,   F_nor = dW_ext/dγ / (A₀ cos γ)                what is measured
+//! ```
+//!
+//! Fibres are so stiff that their waves would set the time step. Along each *fibre line* (the nodes of a yarn behind each
+//! other, or a thread) the mass matrix gains β dt² Σ k b bᵀ, which leaves statics and rigid motion as they are; one
+//! tridiagonal solve a line and step pays for it.
+//!
+//! # How data flow
+//! ```text
+//! case.json ─► case ─► fabric ─► mesh ─► plan ──────► backend ◄── schedule ─► measure ─► output
+//!  what the     typed,  yarns,    nodes,  buffers and  runs        loads in    sizes,     vtu, csv,
+//!  user wrote   checked threads   hexes,  stages: the  stages,     time        tensions,  png, json
+//!                                 beams   algorithm    knows no                force
+//!                                         as data      physics
+//!               └────────── run: one case from end to end, around simulate: the loop in time ──────────┘
+//! ```
+//! Elements write the forces on their own corners only, and every node gathers them in a fixed order. Contact pairs change,
+//! so contact adds integers: any order gives the same bits. A case therefore gives the same result on any number of threads.
+//!
+//! # Where things are
+//! | module | what it holds |
+//! |---|---|
+//! | [`error`] | the one error type: every message names its culprit |
+//! | [`kernel`] | what backends share: lanes, elementary functions, positions in quanta, buffers, stages |
+//! | [`case`] | what a user writes: typed JSON with units, ranges, defaults, schema and overrides |
+//! | [`mesh`] | nodes, blocks of hexahedra, threads, frames (deformed states), surfaces, quality |
+//! | [`fabric`] | from parameters to geometry: yarn sections, the path of the stitch, the cell |
+//! | [`materials`] | constitutive laws: energy, first Piola stress, stiffness |
+//! | [`elements`] | hexahedra, beams, bending between beams |
+//! | [`contact`] | search and penalty forces with friction |
+//! | [`dynamics`] | assembly, fibre lines, integration, limit of the time step |
+//! | [`conditions`] | prescribed motion |
+//! | [`plan`] | the scene as buffers and stages; reading it is reading the algorithm |
+//! | [`backend`] | runs stages: the CPU, with threads and registers of any width |
+//! | [`measure`] | widths, thicknesses, gaps, tensions, shear force |
+//! | [`schedule`] | load steps as smooth functions of time |
+//! | [`output`] | frames, tables, pictures |
+//! | [`simulate`] | a scene in time: steps, contact searches, energies, guards |
+//! | [`run`] | a case with its files: what the program calls |
+//!
+//! Imports point one way: a module knows only those before it in this list (`tests/structure.rs` checks it).
+//! ```text
+//! error kernel case mesh fabric materials elements contact dynamics conditions plan backend measure schedule output simulate run
+//! ```
+//! Moreover, the backend knows only `error` and `kernel`, and `output` does not know `measure`.
+//!
+//! # Where to add
+//! - **A material**: a file in `materials` with `impl Material`, an arm in `materials::Law` and in
+//!   [`case::fabric::Material`]. The tests of `materials` compare its stress with differences of its energy.
+//! - **An element**: a kernel in `elements`, its tables and a stage in `plan`, its slots in [`dynamics::assemble`].
+//! - **A contact law**: beside `contact::friction`; it sees one pair with its state and returns a force.
+//! - **A measure**: a file in `measure`, from [`mesh::Mesh`] and [`mesh::frame::Frame`]; a column in [`output::table`].
+//! - **A scene**: a JSON file in `cases/`. `tricot schema` lists every field.
 
 pub mod backend;
 pub mod case;

@@ -92,7 +92,7 @@ enum Command {
         #[arg(long)]
         field: Option<String>,
         /// Width of the picture in pixels
-        #[arg(long, default_value_t = 1600, value_parser = clap::value_parser!(u16).range(64..=8192))]
+        #[arg(long, default_value_t = 1600, value_parser = clap::value_parser!(u16).range(300..=6000))]
         width: u16,
         /// The picture [default: picture.png in the folder, or beside the frame under its name]
         #[arg(short, long, value_name = "FILE")]

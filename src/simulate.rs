@@ -49,7 +49,7 @@ pub struct Energies {
     pub contact: f64,
     /// ½ Σ m v² of the unknown: the fluctuation velocity in a periodic cell.
     pub kinetic: f64,
-    /// ½ Σ m v² of the total velocity.
+    /// ½ Σ m v² of the total velocity, seen from the centre of mass.
     pub kinetic_total: f64,
     /// Work lost to friction, to contact damping, and to damping.
     pub friction: f64,
@@ -670,8 +670,14 @@ impl Simulation {
         let v = self.backend.scalars(self.model.buffers.velocity);
         let rate =
             if total { self.schedule.row(self.time, 1.0, self.dt_before.max(1e-12)).rate } else { [[0.0; 3]; 3] };
+        let mass: f64 = self.model.mass.iter().sum();
+        let centre = [0, 1, 2].map(|k| {
+            let moments = self.mesh.nodes.iter().zip(&self.model.mass).map(|(x, m)| m * x[k]);
+            if total { moments.sum::<f64>() / mass } else { 0.0 }
+        });
         let mut sum = 0.0;
         for (node, x) in self.mesh.nodes.iter().enumerate() {
+            let x = [0, 1, 2].map(|k| x[k] - centre[k]);
             for k in 0..3 {
                 let affine = rate[k][0] * x[0] + rate[k][1] * x[1] + rate[k][2] * x[2];
                 let v = v[node + k * nodes] + affine;

@@ -5,7 +5,7 @@
 //! candidate that was known keeps its friction, and its face while it touches.
 
 use super::face::{Place, Surface, closest};
-use super::grid::{BOX, absolute, cell_index, cells, inverse};
+use super::grid::{BOX, SLAB, SLAB_FACES, absolute, cell_index, cells, inverse};
 use super::penalty::{SLAVE, SLAVE_VALUES, SLOT_KEYS, SLOT_STATE};
 use super::{EMPTY, Params, key, status};
 use crate::kernel::lane::{Lane, Real};
@@ -61,6 +61,7 @@ impl Kernel for Candidates {
             period: params.period,
         };
         let inverse = inverse(&io.row.gradient);
+        let stretch = [0, 1].map(|k| (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt());
         let (slaves, values, slabs) = (io.uints(SLAVES), io.scalars(VALUES), io.uints(SLABS));
         let (counts, lists, boxes) = (io.uints(COUNTS), io.uints(ITEMS), io.scalars(BOXES));
         let mut keys = io.own::<u32>(KEYS);
@@ -86,7 +87,8 @@ impl Kernel for Candidates {
                     if near >= params.slabs {
                         continue;
                     }
-                    let (body, slice) = (slabs[2 * near as usize], slabs[2 * near as usize + 1] as i32);
+                    let [body, slice, first] = [0, 1, 2].map(|k| slabs[SLAB * near as usize + k]);
+                    let (slice, first) = (slice as i32, first as i32);
                     let bounds = &boxes[BOX * near as usize..][..BOX];
                     if body == own || height < bounds[2] - reach || height > bounds[3] + reach {
                         continue;
@@ -94,6 +96,13 @@ impl Kernel for Candidates {
                     let image = [0, 1].map(|k| {
                         if params.period[k] == 0 { 0 } else { ((position[k] - bounds[k]) / period[k]).to_i32() }
                     });
+                    let beside = |k: usize| {
+                        let from = position[k] - bounds[k] - L::Scalar::from_i32(image[k]) * period[k];
+                        from.abs() > bounds[4 + k] + reach * stretch[k]
+                    };
+                    if beside(0) || beside(1) {
+                        continue;
+                    }
                     // a closed yarn goes on through its own images: count its slices on instead
                     let b = surface.bodies[body as usize];
                     let turns = image[0] * b.wrap[0] + image[1] * b.wrap[1];
@@ -109,8 +118,8 @@ impl Kernel for Candidates {
                         };
                         (end(slice), end(slice + 1))
                     };
-                    let mut here = across(0);
-                    for ring in 0..b.ring as i32 {
+                    let mut here = across(first);
+                    for ring in first..(first + SLAB_FACES as i32).min(b.ring as i32) {
                         let next = across(ring + 1);
                         let corners = [here.0, here.1, next.1, next.0];
                         here = next;

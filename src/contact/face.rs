@@ -26,6 +26,7 @@ pub struct Place {
 }
 
 /// The corners of a face relative to the slave: in the reference and now, in the order (r, s), (r, s+1), (r+1, s+1), (r+1, s).
+#[derive(Clone, Copy)]
 pub struct Corners<R> {
     pub nodes: [usize; 4],
     pub reference: [Vector<R>; 4],
@@ -33,6 +34,7 @@ pub struct Corners<R> {
 }
 
 /// The point of a face closest to the slave.
+#[derive(Clone, Copy)]
 pub struct Closest<R> {
     /// Coordinates on the face, −1 to 1: along the slice and along the ring.
     pub xi: R,
@@ -129,42 +131,128 @@ impl<R: Real> Surface<'_, R> {
     }
 }
 
+/// Faces that a thread node can touch at once.
+pub const MOST_TOUCHED: usize = 12;
+/// Places around the ring that are looked at on either side of the closest face.
+const RING_REACH: i32 = 3;
+
+/// Faces of one body within a distance of a slave.
+pub struct Near<R> {
+    pub count: usize,
+    pub faces: [(Corners<R>, Closest<R>); MOST_TOUCHED],
+}
+
 impl<R: Real> Surface<'_, R> {
-    /// The neighbouring face that is closer than the one a walk ended on, if there is one. A walk downhill ends inside a face,
-    /// but in a fold of a crushed surface a face that rises beside it can be closer; only one that rises can.
+    /// All faces within `reach` (mm) of the slave, the closest one first, found by spreading from it.
+    ///
+    /// Each keeps its own distance, whether its inside, edge or corner is closest: the sum of their penalties is an energy
+    /// without jumps, also where a thread lies in a fold of a crushed surface or passes an edge. The closest face alone
+    /// would change its normal there from step to step.
     #[inline(always)]
-    pub fn closer_neighbour(
+    pub fn faces_within(
         &self,
         slave: usize,
         body: usize,
         image: [i32; 2],
         place: Place,
-        point: &Closest<R>,
-    ) -> Option<Place> {
+        first: (Corners<R>, Closest<R>),
+        reach: R,
+    ) -> Near<R> {
         let b = self.bodies[body];
-        for (ring, slice) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
-            let next = Place { ring: place.ring + ring, slice: place.slice + slice };
-            if b.closed == 0 && !(0..b.slices as i32).contains(&next.slice) {
+        let wide = b.ring as i32 > 2 * RING_REACH;
+        let (touches_back, touches_on) = first.borders_within(reach);
+        let steps = [(-1, touches_back.0), (1, touches_on.0)];
+        let mut near = Near { count: 1, faces: [first; MOST_TOUCHED] };
+        // around the ring, as long as faces are near; then the same in the slices before and after
+        for slice in [0, -1, 1] {
+            if b.closed == 0 && !(0..b.slices as i32).contains(&(place.slice + slice)) {
                 continue;
             }
-            // the far edge of the neighbour
-            let far = |step: i32| i32::from(step > 0);
-            let ends = if ring != 0 {
-                [(next.ring + far(ring), next.slice), (next.ring + far(ring), next.slice + 1)]
-            } else {
-                [(next.ring, next.slice + far(slice)), (next.ring + 1, next.slice + far(slice))]
-            };
-            let mut rises = false;
-            for (ring, slice) in ends {
-                let (node, shift) = self.node(body, image, Place { ring, slice });
-                let above = add(self.from_slave(slave, node, shift).1, point.offset);
-                rises = rises || dot(above, point.normal) > R::from_f64(1e-4);
+            if slice != 0 {
+                let border = if slice < 0 { touches_back.1 } else { touches_on.1 };
+                let next = Place { slice: place.slice + slice, ..place };
+                if !border && !self.rises(slave, body, image, place, next, &near.faces[0].1) {
+                    continue;
+                }
+                if !self.add_near(&mut near, slave, body, image, next, reach) {
+                    continue;
+                }
             }
-            if rises && closest(&self.corners(slave, body, image, next).current).better_than(point) {
-                return Some(next);
+            for (step, border) in steps {
+                for k in 1..=if wide { RING_REACH } else { 1 } {
+                    let next = Place { ring: place.ring + k * step, slice: place.slice + slice };
+                    let beside = Place { slice: place.slice, ..next };
+                    if k == 1 && !border && !self.rises(slave, body, image, place, beside, &near.faces[0].1) {
+                        break;
+                    }
+                    if !self.add_near(&mut near, slave, body, image, next, reach) {
+                        break;
+                    }
+                }
             }
         }
-        None
+        near
+    }
+
+    /// Adds a face if it is within reach; says whether it is.
+    #[inline(always)]
+    fn add_near(&self, near: &mut Near<R>, slave: usize, body: usize, image: [i32; 2], place: Place, reach: R) -> bool {
+        if near.count == MOST_TOUCHED {
+            return false;
+        }
+        let corners = self.corners(slave, body, image, place);
+        let point = closest(&corners.current);
+        let is_near = point.distance < reach;
+        if is_near {
+            near.faces[near.count] = (corners, point);
+            near.count += 1;
+        }
+        is_near
+    }
+
+    /// Whether the far edge of a neighbouring face lies above the plane of the closest point: only then can the neighbour be
+    /// nearer than their common edge.
+    #[inline(always)]
+    fn rises(&self, slave: usize, body: usize, image: [i32; 2], place: Place, next: Place, point: &Closest<R>) -> bool {
+        let (ring, slice) = (next.ring - place.ring, next.slice - place.slice);
+        let far = |step: i32| i32::from(step > 0);
+        let ends = if ring != 0 {
+            [(next.ring + far(ring), next.slice), (next.ring + far(ring), next.slice + 1)]
+        } else {
+            [(next.ring, next.slice + far(slice)), (next.ring + 1, next.slice + far(slice))]
+        };
+        let mut rises = false;
+        for (ring, slice) in ends {
+            let (node, shift) = self.node(body, image, Place { ring, slice });
+            let above = add(self.from_slave(slave, node, shift).1, point.offset);
+            rises = rises || dot(above, point.normal) > R::from_f64(1e-4);
+        }
+        rises
+    }
+}
+
+/// Which borders of a face are within reach of the slave: (ring, slice) on the low and on the high side.
+trait Borders<R> {
+    fn borders_within(&self, reach: R) -> ((bool, bool), (bool, bool));
+}
+
+impl<R: Real> Borders<R> for (Corners<R>, Closest<R>) {
+    #[inline(always)]
+    fn borders_within(&self, reach: R) -> ((bool, bool), (bool, bool)) {
+        let (corners, point) = self;
+        let p = patch(&corners.current);
+        let one = R::from_f64(1.0);
+        let room = (reach * reach - point.distance * point.distance).max(R::from_f64(0.0));
+        // a border is nearer than its distance along the face allows; the factor covers faces that are not rectangles
+        let within = |gap: R, tangent: Vector<R>| {
+            let along = gap * gap * dot(tangent, tangent) * R::from_f64(0.25);
+            along < room
+        };
+        let (t_slice, t_ring) = (fma(p[3], point.eta, p[1]), fma(p[3], point.xi, p[2]));
+        (
+            (within(point.eta + one, t_ring), within(point.xi + one, t_slice)),
+            (within(one - point.eta, t_ring), within(one - point.xi, t_slice)),
+        )
     }
 }
 

@@ -1,4 +1,5 @@
-//! The grid of the contact search: slabs of yarns (one slice of one yarn) and beams, each in every cell that its box touches.
+//! The grid of the contact search: slabs of yarns (some faces around one slice of one yarn) and beams, each in every cell
+//! that its box touches.
 //!
 //! Cells are taken in the pulled-back plane F̄⁻¹x, where the periodic cell keeps its rectangle; a distance ρ in space is at
 //! most ρ |row of F̄⁻¹| along an axis there. A cell lists its items in any order: what is chosen from them does not depend on it.
@@ -13,10 +14,14 @@ use crate::kernel::stage::{Io, Kernel};
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
-/// Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm.
-pub const BOX: usize = 4;
+/// Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm, half sizes in the plane, mm (2).
+pub const BOX: usize = 6;
+/// Integers of a slab: body, slice, first face around the ring.
+pub const SLAB: usize = 3;
+/// Faces of a slab at most.
+pub const SLAB_FACES: usize = 8;
 
-/// Body and slice of each slab.
+/// See [`SLAB`].
 pub const SLABS: usize = 0;
 pub const BODIES: usize = 1;
 pub const RING_LINES: usize = 2;
@@ -124,9 +129,11 @@ impl Kernel for Fill {
                 }
             };
             let reach = if item < params.slabs as usize {
-                let (body, slice) = (slabs[2 * item] as usize, slabs[2 * item + 1] as i32);
-                origin = surface.node(body, [0, 0], Place { ring: 0, slice }).0;
-                for ring in 0..surface.bodies[body].ring as i32 {
+                let [body, slice, first] = [0, 1, 2].map(|k| slabs[SLAB * item + k]);
+                let (body, slice, first) = (body as usize, slice as i32, first as i32);
+                origin = surface.node(body, [0, 0], Place { ring: first, slice }).0;
+                let last = (first + SLAB_FACES as i32).min(surface.bodies[body].ring as i32);
+                for ring in first..=last {
                     for slice in [slice, slice + 1] {
                         let (node, shift) = surface.node(body, [0, 0], Place { ring, slice });
                         grow(surface.from_slave(origin, node, shift).1);
@@ -147,6 +154,8 @@ impl Kernel for Fill {
                 base[1] + half * (low[1] + high[1]),
                 height + low[2],
                 height + high[2],
+                half * (high[0] - low[0]),
+                half * (high[1] - low[1]),
             ]);
             let range = |k: usize| {
                 let reach = reach * (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt();

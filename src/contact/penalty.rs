@@ -6,7 +6,7 @@ use super::{BODY, EMPTY, Params, add_pair, add_stiffness, of_key, status};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::stage::{Io, Kernel, raise};
-use crate::kernel::vector::{apply, dot, fma, scale, sub};
+use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
@@ -44,11 +44,19 @@ const FORCE: usize = 12;
 const STIFFNESS: usize = 13;
 const STATUS: usize = 14;
 
-/// Gap, mm, below which a thread looks for closer faces in folds.
-const NEAR: f64 = 0.01;
-
 /// Contact forces of slave nodes.
 pub struct Penalty;
+
+/// Subtracts force ⊗ ΔX from the sum that makes the homogenised stress.
+#[inline(always)]
+pub fn add_virial<R: Real>(sum: &mut [R], force: Vector<R>, apart: Vector<R>) {
+    for i in 0..3 {
+        for j in 0..3 {
+            let v = &mut sum[SUM_VIRIAL + 3 * i + j];
+            *v = *v - force[i] * apart[j];
+        }
+    }
+}
 
 impl Kernel for Penalty {
     #[inline(always)]
@@ -75,7 +83,6 @@ impl Kernel for Penalty {
         let (forces, stiffness, flags) = (io.atomics(FORCE), io.atomics(STIFFNESS), io.atomic_uints(STATUS));
         let elapsed = io.row.dt_mid + io.row.dt_mid - io.row.dt;
         let per_step = constant(2.0) / io.row.dt;
-        let near = constant(NEAR);
         for item in items {
             let slot_keys = keys.item(0, item);
             if slot_keys[0] == EMPTY {
@@ -96,69 +103,77 @@ impl Kernel for Penalty {
                 }
                 let (body, image) = of_key(at[0]);
                 let from = Place { ring: at[1] as i32, slice: at[2] as i32 };
-                let (mut place, mut corners, mut point) = surface.walk(slave, body, image, from);
-                if is_thread && point.distance < radius + near {
-                    for _ in 0..2 {
-                        let Some(next) = surface.closer_neighbour(slave, body, image, place, &point) else { break };
-                        (place, corners, point) = surface.walk(slave, body, image, next);
-                    }
-                }
+                let (place, corners, point) = surface.walk(slave, body, image, from);
                 (at[1], at[2]) = (place.ring as u32, place.slice as u32);
                 let state = &mut slot_states[SLOT_STATE * slot..][..SLOT_STATE];
                 let elastic = [state[0], state[1], state[2]];
                 let tangential = penalty * real(params.tangential);
-                let touch = point.normal_and_distance(is_thread).filter(|(_, distance)| {
-                    let gap = *distance - radius;
-                    gap < zero && -*distance < real(params.depth)
-                });
-                let Some((normal, distance)) = touch else {
+                let (near, single);
+                let faces = if is_thread && point.distance < radius {
+                    near = surface.faces_within(slave, body, image, place, (corners, point), radius);
+                    &near.faces[..near.count]
+                } else {
+                    single = [(corners, point)];
+                    &single[..]
+                };
+                // the normal forces of all faces, and what friction needs of the closest one
+                let mut push = [zero; 3];
+                let mut normal_force = zero;
+                let mut first = None;
+                for (corners, point) in faces {
+                    let Some((normal, distance)) = point.normal_and_distance(is_thread) else { continue };
+                    let depth = radius - distance;
+                    if depth <= zero || -distance >= real(params.depth) {
+                        continue;
+                    }
+                    let weights = point.weights();
+                    let mut motion = velocity.at(slave);
+                    let mut apart = [zero; 3];
+                    let mut inverse = constant(1.0) / mass[slave];
+                    for a in 0..4 {
+                        motion = fma(velocity.at(corners.nodes[a]), -weights[a], motion);
+                        apart = fma(corners.reference[a], -weights[a], apart);
+                        inverse = inverse + weights[a] * weights[a] / mass[corners.nodes[a]];
+                    }
+                    let motion = add(motion, apply(&io.row.rate, apart));
+                    let approach = dot(motion, normal);
+                    let viscosity = real(params.damping) * constant(2.0) * (penalty / inverse).sqrt();
+                    let elastic_force = penalty * depth;
+                    let pressing = (elastic_force - viscosity * approach).max(zero);
+                    sum[SUM_DAMPING] = sum[SUM_DAMPING] + (elastic_force - pressing) * approach * elapsed;
+                    sum[SUM_RADIUS] = sum[SUM_RADIUS] + elastic_force * full_radius * io.row.radius_increment;
+                    energy = energy + constant(0.5) * elastic_force * depth;
+                    let force = scale(normal, pressing);
+                    push = add(push, force);
+                    normal_force = normal_force + pressing;
+                    add_virial(sum, force, apart);
+                    let masters = [0, 1, 2, 3].map(|a| (corners.nodes[a], weights[a]));
+                    let one = (slave, constant(1.0));
+                    add_pair(forces, &flags[status::FLAGS], force, real(params.force_quantum), [one], masters);
+                    let row_sum = constant(2.0) * (penalty + viscosity * per_step);
+                    let nodes = masters.into_iter().chain([one]);
+                    add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes);
+                    raise(&flags[status::PENETRATION[usize::from(!is_thread)]], depth);
+                    first = first.or(Some((motion, apart, masters)));
+                }
+                let size = norm(push);
+                let Some((motion, apart, masters)) = first.filter(|_| size > zero) else {
                     sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
                     state.fill(zero);
                     continue;
                 };
                 touches = true;
-                let depth = radius - distance;
-                let weights = point.weights();
-                let mut motion = velocity.at(slave);
-                let mut apart = [zero; 3];
-                for a in 0..4 {
-                    motion = fma(velocity.at(corners.nodes[a]), -weights[a], motion);
-                    apart = fma(corners.reference[a], -weights[a], apart);
-                }
-                let rate = apply(&io.row.rate, apart);
-                let motion = [motion[0] + rate[0], motion[1] + rate[1], motion[2] + rate[2]];
-                let approach = dot(motion, normal);
-                let mut inverse = constant(1.0) / mass[slave];
-                for a in 0..4 {
-                    inverse = inverse + weights[a] * weights[a] / mass[corners.nodes[a]];
-                }
-                let viscosity = real(params.damping) * constant(2.0) * (penalty / inverse).sqrt();
-                let elastic_force = penalty * depth;
-                let normal_force = (elastic_force - viscosity * approach).max(zero);
-                sum[SUM_DAMPING] = sum[SUM_DAMPING] + (elastic_force - normal_force) * approach * elapsed;
-                sum[SUM_RADIUS] = sum[SUM_RADIUS] + elastic_force * full_radius * io.row.radius_increment;
                 let limit = real(params.friction) * normal_force;
-                let slid = slide(elastic, scale(motion, elapsed), normal, tangential, limit);
+                let slid = slide(elastic, scale(motion, elapsed), scale(push, constant(1.0) / size), tangential, limit);
                 sum[SUM_FRICTION] = sum[SUM_FRICTION] + slid.dissipated;
                 sum[SUM_SLIP] = sum[SUM_SLIP] + slid.slip;
                 state[..3].copy_from_slice(&slid.elastic);
                 state[3] = normal_force;
-                energy =
-                    energy + constant(0.5) * (elastic_force * depth + tangential * dot(slid.elastic, slid.elastic));
-                let force = sub(scale(normal, normal_force), scale(slid.elastic, tangential));
-                for i in 0..3 {
-                    for j in 0..3 {
-                        let v = &mut sum[SUM_VIRIAL + 3 * i + j];
-                        *v = *v - force[i] * apart[j];
-                    }
-                }
-                let masters = [0, 1, 2, 3].map(|a| (corners.nodes[a], weights[a]));
+                energy = energy + constant(0.5) * tangential * dot(slid.elastic, slid.elastic);
+                let force = scale(slid.elastic, -tangential);
+                add_virial(sum, force, apart);
                 let one = (slave, constant(1.0));
                 add_pair(forces, &flags[status::FLAGS], force, real(params.force_quantum), [one], masters);
-                let row_sum = constant(2.0) * (penalty + viscosity * per_step);
-                let nodes = masters.into_iter().chain([one]);
-                add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes);
-                raise(&flags[status::PENETRATION[usize::from(!is_thread)]], depth);
             }
             sum[SUM_ENERGY] = energy;
             if touches {

@@ -1,10 +1,11 @@
 //! Contact of beams with beams: closest points of two segments, penalty and friction as for faces.
 //!
-//! Where the closest point is an end that two beams of a thread share, each counts half.
+//! Every pair within reach counts, also where two beams of a thread are near with their common end: the distance of each
+//! pair is continuous, so the energy is, and nothing is gained as a contact passes from beam to beam.
 
 use super::friction::slide;
 use super::grid::{BOX, absolute, cell_index, cells, inverse, pull_back};
-use super::penalty::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, SUM_VIRIAL};
+use super::penalty::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial};
 use super::{EMPTY, Params, add_pair, add_stiffness, key, of_key, status};
 use crate::elements::beam2;
 use crate::kernel::lane::{Lane, Real};
@@ -225,8 +226,7 @@ impl Kernel for Force {
                 let offset = sub(scale(along, s), fma(direction, t, apart));
                 let distance = norm(offset);
                 let depth = radius + radius - distance;
-                let share = |x: L::Scalar| if x <= zero || x >= one { constant(0.5) } else { one };
-                let penalty = real(params.thread_thread) * share(s) * share(t);
+                let penalty = real(params.thread_thread);
                 let tangential = penalty * real(params.tangential);
                 let state = &mut slot_states[STATE * slot..][..STATE];
                 let elastic = [state[0], state[1], state[2]];
@@ -268,12 +268,7 @@ impl Kernel for Force {
                 energy =
                     energy + constant(0.5) * (elastic_force * depth + tangential * dot(slid.elastic, slid.elastic));
                 let force = sub(scale(normal, normal_force), scale(slid.elastic, tangential));
-                for i in 0..3 {
-                    for j in 0..3 {
-                        let v = &mut sum[SUM_VIRIAL + 3 * i + j];
-                        *v = *v - force[i] * between[j];
-                    }
-                }
+                add_virial(sum, force, between);
                 add_pair(forces, &flags[status::FLAGS], force, real(params.force_quantum), nodes, others);
                 let row_sum = constant(2.0) * (penalty + viscosity * per_step);
                 add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes.into_iter().chain(others));

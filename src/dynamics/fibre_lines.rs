@@ -78,18 +78,19 @@ impl Kernel for FibreLines {
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let groups: &[Group] = bytemuck::cast_slice(io.uints(GROUPS));
+        // taken out rather than borrowed in a closure, which would not be compiled for the instruction set
+        let mut memory = SCRATCH.take();
         for group in items {
             let group = groups[group];
-            SCRATCH.with_borrow_mut(|scratch| {
-                scratch.resize(ROWS * LANES * (group.stations as usize + 1), 0.0);
-                let scratch: &mut [L::Scalar] = bytemuck::cast_slice_mut(scratch);
-                gather::<L>(io, &group, scratch);
-                for lane in (0..group.lines as usize).step_by(L::WIDTH) {
-                    solve::<L>(io, &group, &mut Sweep { scratch, lane });
-                }
-                scatter(io, &group, scratch);
-            });
+            memory.resize(memory.len().max(ROWS * LANES * (group.stations as usize + 1)), 0.0);
+            let scratch: &mut [L::Scalar] = bytemuck::cast_slice_mut(&mut memory);
+            gather::<L>(io, &group, scratch);
+            for lane in (0..group.lines as usize).step_by(L::WIDTH) {
+                solve::<L>(io, &group, &mut Sweep { scratch, lane });
+            }
+            scatter(io, &group, scratch);
         }
+        SCRATCH.set(memory);
     }
 }
 

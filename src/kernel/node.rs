@@ -1,7 +1,7 @@
 //! Access to the state of nodes: three planes (x, y, z) a buffer.
 
 use super::lane::Real;
-use super::position::difference;
+use super::position::{QUANTUM, difference};
 use super::stage::Io;
 use super::vector::Vector;
 
@@ -24,10 +24,12 @@ impl<'a, R: Real> Displacements<'a, R> {
     /// Displacement of `a` less that of `b`, mm.
     #[inline(always)]
     pub fn between(&self, a: usize, b: usize) -> Vector<R> {
-        [0, 1, 2].map(|k| {
+        let mut d = [R::from_f64(0.0); 3];
+        for (k, d) in d.iter_mut().enumerate() {
             let (a, b) = (a + k * self.plane, b + k * self.plane);
-            difference(self.quanta[a], self.remainder[a], self.quanta[b], self.remainder[b])
-        })
+            *d = difference(self.quanta[a], self.remainder[a], self.quanta[b], self.remainder[b]);
+        }
+        d
     }
 }
 
@@ -71,10 +73,11 @@ impl<'a> Lattice<'a> {
     #[inline(always)]
     pub fn between<R: Real>(&self, a: usize, b: usize, shift: [i32; 2]) -> Vector<R> {
         let shift = [shift[0], shift[1], 0];
-        [0, 1, 2].map(|k| {
-            let d =
-                self.quanta[a + k * self.plane].wrapping_sub(self.quanta[b + k * self.plane]).wrapping_add(shift[k]);
-            R::from_i32(d) * R::from_f64(super::position::QUANTUM)
-        })
+        let mut d = [R::from_f64(0.0); 3];
+        for (k, d) in d.iter_mut().enumerate() {
+            let (a, b) = (self.quanta[a + k * self.plane], self.quanta[b + k * self.plane]);
+            *d = R::from_i32(a.wrapping_sub(b).wrapping_add(shift[k])) * R::from_f64(QUANTUM);
+        }
+        d
     }
 }

@@ -1,4 +1,5 @@
-//! Vectors of three numbers, for the kernels that work one item at a time.
+//! Vectors of three numbers, for the kernels that work one item at a time. Products and sums are rounded one by one: a fused
+//! operation costs a call wherever the compiler leaves the functions of an instruction set.
 
 use super::lane::Lane;
 
@@ -23,12 +24,12 @@ pub fn scale<L: Lane>(a: Vector<L>, s: L) -> Vector<L> {
 /// `a s + b`.
 #[inline(always)]
 pub fn fma<L: Lane>(a: Vector<L>, s: L, b: Vector<L>) -> Vector<L> {
-    [a[0].fma(s, b[0]), a[1].fma(s, b[1]), a[2].fma(s, b[2])]
+    [a[0] * s + b[0], a[1] * s + b[1], a[2] * s + b[2]]
 }
 
 #[inline(always)]
 pub fn dot<L: Lane>(a: Vector<L>, b: Vector<L>) -> L {
-    a[2].fma(b[2], a[1].fma(b[1], a[0] * b[0]))
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]

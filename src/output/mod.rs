@@ -1,7 +1,7 @@
 //! What a run leaves on disk: frames for ParaView, tables and pictures. Everything is written from a [`Mesh`](crate::mesh::Mesh)
 //! and a [`Frame`](crate::mesh::frame::Frame) or from plain numbers; nothing here computes a result.
 //!
-//! - [`vtu`]: frames and their collection; [`table`]: CSV files;
+//! - [`vtu`]: frames and their collection, [`vtu_read`] reads them back; [`table`]: CSV files;
 //! - [`picture`] renders a frame: [`scene`] turns it into triangles, [`raster`] draws those into a depth buffer and lights
 //!   them, [`image`] holds pixels, with letters from [`text`] and colours from [`colour`];
 //! - [`mod@file`]: how a file is replaced as a whole or not at all.
@@ -16,3 +16,4 @@ pub mod scene;
 pub mod table;
 pub mod text;
 pub mod vtu;
+pub mod vtu_read;

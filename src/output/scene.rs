@@ -89,7 +89,9 @@ fn paint<'a>(frame: &'a Frame, name: &str) -> Result<Paint<'a>> {
     let found: Vec<&Field> = [node, hex, beam].into_iter().flatten().collect();
     if found.is_empty() {
         let all = [&frame.node_fields, &frame.hex_fields, &frame.beam_fields];
-        let names: Vec<&str> = all.into_iter().flatten().map(|f| f.name.as_str()).collect();
+        let mut names: Vec<&str> = all.into_iter().flatten().map(|f| f.name.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
         let names = if names.is_empty() { "none".to_string() } else { names.join(", ") };
         return Err(Error::case("picture", format!("no field is named {name:?}; available: {names}")));
     }

@@ -11,6 +11,7 @@
 //! the fibre direction of a yarn, the axis of a beam).
 //! A field of hexahedra and one of beams with the same name and size become one array. Where a field has no value, it is NaN.
 //!
+//! Field data hold `TimeValue` (s), `shear_angle_deg` and `macroscopic_gradient` (F̄, the in-plane part, rows first).
 //! Positions are Float64, fields Float32, in binary blocks compressed by zlib.
 
 use super::file::replace;
@@ -32,7 +33,7 @@ const BLOCK: usize = 1 << 18;
 pub fn write(mesh: &Mesh, frame: &Frame, path: &Path) -> Result<()> {
     frame.check(mesh)?;
     let grid = Grid::of(mesh, frame);
-    replace(path, |w| grid.write(w, frame.time))
+    replace(path, |w| grid.write(w, frame))
 }
 
 /// Writes a collection (`.pvd`): times in s and files relative to it.
@@ -120,17 +121,24 @@ impl Grid {
         Self { points, connectivity, offsets, types, point_data, cell_data }
     }
 
-    fn write(&self, w: &mut dyn Write, time: f64) -> io::Result<()> {
+    fn write(&self, w: &mut dyn Write, frame: &Frame) -> io::Result<()> {
         writeln!(w, "<?xml version=\"1.0\"?>")?;
         write!(
             w,
             "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" "
         )?;
         writeln!(w, "compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<FieldData>")?;
-        writeln!(
-            w,
-            "<DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">{time:?}</DataArray>"
-        )?;
+        let gradient = frame.gradient.concat();
+        for (name, values) in [
+            ("TimeValue", &[frame.time][..]),
+            ("shear_angle_deg", &[frame.angle_deg]),
+            ("macroscopic_gradient", &gradient),
+        ] {
+            let values: Vec<String> = values.iter().map(|v| format!("{v:?}")).collect();
+            let (count, values) = (values.len(), values.join(" "));
+            write!(w, "<DataArray type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"{count}\" ")?;
+            writeln!(w, "NumberOfTuples=\"1\" format=\"ascii\">{values}</DataArray>")?;
+        }
         writeln!(w, "</FieldData>")?;
         writeln!(w, "<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">", self.points.len() / 3, self.types.len())?;
         writeln!(w, "<Points>")?;

@@ -532,7 +532,7 @@ impl ContactScene<'_> {
             return None;
         }
         let nodes = self.mesh.nodes.len();
-        let slabs = surfaces.slabs.len() / 2;
+        let slabs = surfaces.slabs.len() / grid::SLAB;
         let params = self.params(&surfaces, slabs);
         let cells = (params.cells[0] * params.cells[1]) as usize;
         let force = b.add("contact force", Kind::Int, 3 * nodes, false, Initial::Zero);

@@ -2,6 +2,7 @@
 
 use super::threads::Threads;
 use crate::case::effects::Contact;
+use crate::contact::grid::SLAB_FACES;
 use crate::contact::{Body, EMPTY};
 use crate::mesh::surface::Surface;
 use crate::mesh::{Mesh, Seen};
@@ -11,7 +12,7 @@ use crate::mesh::{Mesh, Seen};
 pub struct Surfaces {
     pub bodies: Vec<Body>,
     pub ring_lines: Vec<u32>,
-    /// Body and slice of each slab.
+    /// Body, slice and first face around the ring of each slab.
     pub slabs: Vec<u32>,
     /// Node and own body of each slave.
     pub slaves: Vec<u32>,
@@ -36,7 +37,10 @@ impl Surfaces {
             });
             let lines = (0..surface.ring()).map(|r| surface.node(r, 0)).map(|Seen { node, .. }| node as u32);
             t.ring_lines.extend(lines);
-            t.slabs.extend((0..block.slices).flat_map(|s| [number as u32, s as u32]));
+            for slice in 0..block.slices {
+                let parts = (0..surface.ring()).step_by(SLAB_FACES);
+                t.slabs.extend(parts.flat_map(|ring| [number as u32, slice as u32, ring as u32]));
+            }
             if contact.yarn_yarn && mesh.blocks.len() > 1 {
                 let stations = block.stations();
                 for (place, area) in surface.tributary_areas(mesh).into_iter().enumerate() {

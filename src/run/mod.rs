@@ -1,25 +1,35 @@
 //! Case in, results out: owns the plan, the backend, the schedule, the measures and the outputs of one run.
 
+mod check;
+mod mesh;
+mod picture;
+mod summary;
+
+pub use check::check;
+pub use mesh::mesh;
+pub use picture::picture;
+
+use crate::case::Case;
 use crate::case::domain::Domain;
 use crate::case::read::Loaded;
 use crate::case::steps::{Precision, Step};
 use crate::error::{Error, Result};
 use crate::fabric;
 use crate::measure::{shear, stitches, yarns};
-use crate::mesh::frame::Frame;
-use crate::mesh::{Mesh, Ply, export, report};
-use crate::output::picture::{View, render};
+use crate::mesh::{Mesh, Ply};
 use crate::output::table::{HISTORY, STITCHES, Table, YARNS};
 use crate::output::{directory, file, vtu};
-use crate::plan::{self, Capacity};
 use crate::simulate::{Make, Simulation};
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::json;
-use std::fmt::{self, Write as _};
+use picture::draw;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
+
+/// The case in a folder of results, with every default written out.
+const CASE: &str = "case.json";
 
 /// What the command line says about a run, beyond the case.
 #[derive(Debug, Clone)]
@@ -62,6 +72,11 @@ fn scene(loaded: &Loaded) -> Result<(Mesh, f64)> {
     Ok((mesh, friction))
 }
 
+/// Writes the case, its fabric inline, so that a folder of results can be drawn and run again by itself.
+fn write_case(case: &Case, dir: &Path) -> Result<()> {
+    file::replace(&dir.join(CASE), |w| serde_json::to_writer_pretty(w, case).map_err(Into::into))
+}
+
 /// Prepares a case for running, without files.
 pub fn simulation(loaded: &Loaded, make: Make) -> Result<Simulation> {
     let (mesh, friction) = scene(loaded)?;
@@ -73,18 +88,20 @@ pub fn simulation(loaded: &Loaded, make: Make) -> Result<Simulation> {
 /// # Errors
 /// Bad input, a folder that cannot be used, or a guard that stopped the run; what was computed by then stays on disk.
 pub fn run(loaded: &Loaded, options: &Options) -> Result<Outcome> {
-    let make = Make {
-        precision: options.precision.unwrap_or(loaded.case.integration.precision),
-        threads: options.threads.unwrap_or(0),
-        ..Make::default()
-    };
-    let simulation = simulation(loaded, make)?;
+    let mut loaded = loaded.clone();
+    if let Some(precision) = options.precision {
+        loaded.case.integration.precision = precision;
+    }
+    let make =
+        Make { precision: loaded.case.integration.precision, threads: options.threads.unwrap_or(0), ..Make::default() };
+    let simulation = simulation(&loaded, make)?;
     directory::prepare(&options.output, options.force)?;
+    write_case(&loaded.case, &options.output)?;
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
     // a second run in one process keeps the first handler, which is as good
     let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
-    let mut run = Run::new(loaded, options, simulation, stopped)?;
+    let mut run = Run::new(&loaded, options, simulation, stopped)?;
     let result = run.go();
     run.finish(result)
 }
@@ -103,6 +120,8 @@ struct Run<'a> {
     frames: Vec<(f64, String)>,
     pictures: Vec<PathBuf>,
     curve: Vec<(f64, f64)>,
+    /// Largest prescribed displacement, mm.
+    reach: f64,
     /// Shear angle (rad) and external work (mJ) at the last row.
     last_shear: [f64; 2],
     settled: Option<yarns::Sizes>,
@@ -112,6 +131,13 @@ struct Run<'a> {
     largest_added: [f64; 2],
     dt_range: [f64; 2],
     started: Instant,
+}
+
+/// Largest displacement that a domain prescribes, mm.
+fn reach(domain: &Domain) -> f64 {
+    let Domain::Mesh(inline) = domain else { return 0.0 };
+    let size = |d: &[f64; 3]| libm::sqrt(d.iter().map(|c| c * c).sum());
+    inline.conditions.iter().map(|c| size(&c.displacement_mm)).fold(0.0, f64::max)
 }
 
 /// Angle after which the kinetic energy of shear is judged, degrees.
@@ -156,6 +182,7 @@ impl<'a> Run<'a> {
             frames: Vec::new(),
             pictures: Vec::new(),
             curve: Vec::new(),
+            reach: reach(&loaded.case.domain),
             last_shear: [0.0; 2],
             settled: None,
             settled_weft: None,
@@ -282,7 +309,7 @@ impl<'a> Run<'a> {
             phase.into(),
             s.dt().into(),
             degrees.into(),
-            motion.into(),
+            (motion * self.reach).into(),
             reaction.into(),
             force.into(),
             e.internal().into(),
@@ -351,251 +378,10 @@ impl<'a> Run<'a> {
             Ok(()) => "finished".to_owned(),
             Err(error) => error.to_string(),
         };
-        self.write_summary(&verdict)?;
+        let written = self.write_summary(&verdict);
+        // what stopped the run is the error to report, even if it keeps the summary from being written too
         result?;
+        written?;
         Ok(Outcome { interrupted, text: self.lines(&verdict) })
     }
-
-    fn write_summary(&self, verdict: &str) -> Result<()> {
-        let s = &self.simulation;
-        let (e, h) = (s.energies(), s.health());
-        let sum = |m: &[f64]| m.iter().sum::<f64>();
-        let first = s.model.first_thread;
-        let floor = |range: std::ops::Range<usize>| {
-            let mass = sum(&s.model.true_mass[range.clone()]);
-            if mass > 0.0 { sum(&s.model.mass[range]) / mass - 1.0 } else { 0.0 }
-        };
-        let summary = json!({
-            "verdict": verdict,
-            "case": self.loaded.case,
-            "defaults": self.loaded.defaults.iter().map(|(path, value)| json!({"path": path, "value": value})).collect::<Vec<_>>(),
-            "hexes": s.mesh.hexes(),
-            "beams": s.mesh.beams(),
-            "nodes": s.mesh.nodes.len(),
-            "backend": s.backend().describe(),
-            "steps": s.step(),
-            "time_s": s.time(),
-            "dt_smallest_s": self.dt_range[0],
-            "dt_largest_s": self.dt_range[1],
-            "dt_limit_s": h.dt_limit,
-            "contact_searches": s.searches(),
-            "wall_s": self.started.elapsed().as_secs_f64(),
-            "stage_wall_s": s.backend().timings().into_iter().map(|(name, t)| json!({"stage": name, "s": t})).collect::<Vec<_>>(),
-            "added_mass": {
-                "floor_solids": floor(0..first),
-                "floor_threads": floor(first..s.mesh.nodes.len()),
-                "contact_solids_largest": self.largest_added[0],
-                "contact_threads_largest": self.largest_added[1],
-            },
-            "worst_energy_balance": self.worst_balance,
-            "worst_kinetic_over_internal_in_shear": self.worst_kinetic,
-            "energies_mj": e.columns().into_iter().map(|(name, value)| (name.to_owned(), json!(value))).collect::<serde_json::Map<_, _>>(),
-            "state_hash": format!("{:016x}", s.state_hash()),
-            "frames": self.frames.iter().map(|(time, file)| json!({"time_s": time, "file": file})).collect::<Vec<_>>(),
-        });
-        let path = self.options.output.join("summary.json");
-        file::replace(&path, |w| serde_json::to_writer_pretty(w, &summary).map_err(Into::into))
-    }
-
-    /// The lines a person wants to read.
-    fn lines(&self, verdict: &str) -> String {
-        let s = &self.simulation;
-        let (e, h) = (s.energies(), s.health());
-        let mut t = String::new();
-        let wall = self.started.elapsed().as_secs_f64();
-        // writing to a String does not fail
-        let _ = writeln!(t, "{}: {verdict}", self.loaded.case.title);
-        let _ = writeln!(
-            t,
-            "mesh       {} hexes, {} beams, {} nodes; {}",
-            s.mesh.hexes(),
-            s.mesh.beams(),
-            s.mesh.nodes.len(),
-            s.backend().describe()
-        );
-        let _ = writeln!(
-            t,
-            "time       {:.3} ms in {} steps of {:.2e} to {:.2e} s, {} contact searches; {wall:.1} s of wall time",
-            1e3 * s.time(),
-            s.step(),
-            self.dt_range[0],
-            self.dt_range[1],
-            s.searches()
-        );
-        for (name, sizes, target) in [
-            ("warp", &self.settled, "4.59 ± 0.13 / 0.38 ± 0.06 / 0.39 ± 0.10"),
-            ("weft", &self.settled_weft, "2.08 ± 0.08 / 0.38 ± 0.04 / 0.40 ± 0.04"),
-        ] {
-            if let Some(p) = sizes {
-                let _ = writeln!(
-                    t,
-                    "{name}       width / thickness / gap {:.2} / {:.2} / {:.2} mm before shear (PX35 tomography {target})",
-                    p.width.mean, p.thickness.mean, p.gap.mean
-                );
-            }
-        }
-        if let Ok(tension) = stitches::measure(&s.mesh, &s.tensions())
-            && !s.mesh.threads.is_empty()
-        {
-            let all = tension.all;
-            let _ = writeln!(
-                t,
-                "stitch     tension {:.3} / {:.3} / {:.3} N (min / mean / max), {:.0} % slack",
-                all.min_n,
-                all.mean_n,
-                all.max_n,
-                100.0 * all.slack_share
-            );
-        }
-        if !self.curve.is_empty() {
-            let at = |angle: f64| {
-                let near = self.curve.iter().filter(|(a, _)| (a.abs() - angle).abs() <= 1.0).map(|(_, f)| *f);
-                let (sum, count) = near.fold((0.0, 0), |(s, n), f| (s + f, n + 1));
-                (count > 0).then(|| format!("{:.4} at {angle}°", sum / f64::from(count)))
-            };
-            let forces: Vec<String> = [5.0, 15.0, 25.0, 35.0, 45.0].into_iter().filter_map(at).collect();
-            let _ = writeln!(t, "F_nor      {} N/mm (mean over ±1°)", forces.join(", "));
-        }
-        let _ = writeln!(
-            t,
-            "energy     internal {:.3} mJ, friction {:.3} mJ; balance within {:.2} %; kinetic under {:.2} % of internal in shear",
-            e.internal(),
-            e.friction,
-            100.0 * self.worst_balance,
-            100.0 * self.worst_kinetic
-        );
-        let _ = writeln!(
-            t,
-            "checks     smallest det F {:.3}; added mass at most {:.1} % of yarns, {:.1} % of threads; state {:016x}",
-            h.min_jacobian,
-            100.0 * self.largest_added[0],
-            100.0 * self.largest_added[1],
-            s.state_hash()
-        );
-        let picture = self.pictures.last().map_or(String::new(), |p| format!("; picture {}", p.display()));
-        let _ = write!(t, "results    {}{picture}", self.options.output.display());
-        t
-    }
-}
-
-fn draw(mesh: &Mesh, frame: &Frame, title: &str, field: Option<&str>, width: usize, path: &Path) -> Result<()> {
-    let title = if frame.angle_deg == 0.0 {
-        format!("{title}, t = {:.2} ms", 1e3 * frame.time)
-    } else {
-        format!("{title}, {:.1}°", frame.angle_deg)
-    };
-    let view = View { field: field.map(str::to_owned), width_px: width, title, ..View::default() };
-    render(mesh, frame, &view)?.write_png(path)
-}
-
-/// Writes the mesh of a case to a folder: VTU and Abaqus input; returns its report.
-pub fn mesh(loaded: &Loaded, dir: &Path) -> Result<String> {
-    let (mesh, _) = scene(loaded)?;
-    std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
-    let frame = Frame { gradient: [[1.0, 0.0], [0.0, 1.0]], positions: mesh.nodes.clone(), ..Frame::default() };
-    vtu::write(&mesh, &frame, &dir.join("mesh.vtu"))?;
-    export::write_inp(&mesh, &dir.join("mesh.inp"))?;
-    draw(&mesh, &frame, &loaded.case.title, None, 1600, &dir.join("mesh.png"))?;
-    let files = format!("written    {0}/mesh.vtu, {0}/mesh.inp, {0}/mesh.png", dir.display());
-    Ok(format!("{}\n{files}", report::report(&mesh, &loaded.case)))
-}
-
-/// Sizes and cost of a case; with `explain` the defaults in use and every stage of its plan.
-pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
-    let (mesh, friction) = scene(loaded)?;
-    let model = plan::build(&loaded.case, friction, &mesh, Capacity::default())?;
-    let bytes: usize = model.plan.buffers.iter().map(|b| 4 * b.len).sum();
-    let mut probe = Simulation::new(&loaded.case, friction, mesh, Make::default())?;
-    probe.advance(0.0, |_| false)?;
-    let started = Instant::now();
-    let (dt, end) = (probe.dt(), probe.schedule.end());
-    // a few steps for the expected time; the first burst warms up
-    probe.advance(16.0 * dt, |_| false)?;
-    let warm = Instant::now();
-    let steps = probe.step();
-    probe.advance(probe.time() + 64.0 * dt, |_| false)?;
-    let per_step = warm.elapsed().as_secs_f64() / (probe.step() - steps).max(1) as f64;
-    let _ = started;
-    let settled = loaded
-        .case
-        .integration
-        .dt_s
-        .unwrap_or(loaded.case.integration.dt_max_s.min(loaded.case.integration.safety * probe.health().dt_limit));
-    let steps = end / settled;
-    let mut t = String::new();
-    // writing to a String does not fail
-    let _ = writeln!(t, "{}: valid", loaded.case.title);
-    let _ = writeln!(
-        t,
-        "mesh       {} hexes, {} beams, {} nodes; {:.1} MB of buffers in f32",
-        probe.mesh.hexes(),
-        probe.mesh.beams(),
-        probe.mesh.nodes.len(),
-        bytes as f64 / 1e6
-    );
-    let _ = writeln!(t, "effects    {}", effects(loaded).join(", "));
-    let _ = write!(
-        t,
-        "time       {:.3} ms; limit {:.2e} s at node {} ({}), step {settled:.2e} s, about {steps:.0} steps of {:.3} ms: {:.0} s on {}",
-        1e3 * end,
-        probe.health().dt_limit,
-        probe.health().limiting_node,
-        probe.node_owner(probe.health().limiting_node),
-        1e3 * per_step,
-        per_step * steps,
-        probe.backend().describe()
-    );
-    if explain {
-        let plan = &model.plan;
-        for (list, stages) in
-            [("step", &plan.step), ("watch", &plan.watch), ("search", &plan.search), ("diagnose", &plan.diagnose)]
-        {
-            let _ = write!(t, "\n{list}");
-            for stage in stages {
-                let names = |buffers: Vec<_>| {
-                    let names: Vec<&str> =
-                        buffers.into_iter().map(|b: crate::kernel::buffer::Buffer| plan.buffers[b.0].name).collect();
-                    names.join(", ")
-                };
-                let _ = write!(
-                    t,
-                    "\n  {:<14} {:>7} items  reads {}; writes {}",
-                    stage.name,
-                    stage.count,
-                    names(stage.reads.clone()),
-                    names(stage.writes.iter().map(|w| w.0).collect())
-                );
-            }
-        }
-        let _ = write!(t, "\ndefaults");
-        for (path, value) in &loaded.defaults {
-            let _ = write!(t, "\n  {path} = {value}");
-        }
-    }
-    Ok(t)
-}
-
-/// Names of the effects that are on.
-fn effects(loaded: &Loaded) -> Vec<String> {
-    let e = &loaded.case.effects;
-    let contact = e.contact.as_ref();
-    let on = [
-        ("thread–yarn contact", contact.is_some_and(|c| c.thread_yarn)),
-        ("yarn–yarn contact", contact.is_some_and(|c| c.yarn_yarn)),
-        ("thread–thread contact", contact.is_some_and(|c| c.thread_thread)),
-        ("friction", contact.is_some_and(|c| c.friction)),
-        ("bending", e.bending),
-        ("damping", e.damping.is_some()),
-        ("fibre lines", e.fibre_lines.is_some()),
-        ("contact mass", e.contact_mass.is_some()),
-        ("mass floor", e.mass_floor > 0.0),
-        ("gravity", e.gravity_mm_s2.is_some()),
-        ("periodic cell", matches!(loaded.case.domain, Domain::Cell { .. })),
-    ];
-    on.into_iter().filter(|(_, on)| *on).map(|(name, _)| name.to_owned()).collect()
-}
-
-/// Renders a frame, or the last frame of a run, to a PNG.
-pub fn picture(_source: &Path, _field: Option<&str>, _width: usize, _out: &Path) -> Result<String> {
-    Err(Error::Unsupported("pictures of written frames are not built yet".into()))
 }

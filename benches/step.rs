@@ -1,0 +1,53 @@
+//! What a whole step of the default cell costs from the middle of a quick pre-tension on, on one thread and on all cores. Searches,
+//! energies and guards are in it, as in a run.
+
+use criterion::{Criterion, SamplingMode};
+use std::path::Path;
+use std::time::{Duration, Instant};
+use tricot::case::read::read;
+use tricot::run::simulation;
+use tricot::simulate::Make;
+
+/// Tightens the stitch within the steps of a benchmark, so that contact is busy.
+const QUICK: &str = "steps.0.pretension.time_s=3e-4";
+/// Steps of one iteration: those between two looks at energies and limits.
+const STEPS: u64 = 64;
+
+fn main() {
+    let loaded = read(Path::new("cases/unit_cell_shear.json"), &[QUICK.into()]).expect("the case is valid");
+    let mut criterion = Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(8))
+        .configure_from_args();
+    let mut lines = Vec::new();
+    for (name, threads) in [("one thread", 1), ("all cores", 0)] {
+        let mut cell = simulation(&loaded, Make { threads, ..Make::default() }).expect("the cell can be built");
+        cell.advance(1.5e-4, |_| false).expect("the cell runs");
+        let (mut steps, mut spent) = (0, Duration::ZERO);
+        let mut group = criterion.benchmark_group("64 steps");
+        group.sampling_mode(SamplingMode::Flat).bench_function(name, |bencher| {
+            bencher.iter_custom(|count| {
+                let (before, started) = (cell.step(), Instant::now());
+                let until = cell.time() + (STEPS * count) as f64 * cell.dt();
+                cell.advance(until, |_| false).expect("the cell runs");
+                let (done, time) = (cell.step() - before, started.elapsed());
+                steps += done;
+                spent += time;
+                time.mul_f64((STEPS * count) as f64 / done.max(1) as f64)
+            });
+        });
+        group.finish();
+        let step = spent.as_secs_f64() / steps.max(1) as f64;
+        lines.push(format!(
+            "{:.3} ms per step, {:.2} M hexes/s; {} hexes, {} beams; {}",
+            1e3 * step,
+            1e-6 * cell.mesh.hexes() as f64 / step,
+            cell.mesh.hexes(),
+            cell.mesh.beams(),
+            cell.backend().describe()
+        ));
+    }
+    criterion.final_summary();
+    println!("\n{}", lines.join("\n"));
+}

@@ -1,0 +1,132 @@
+//! What a run says at its end: `summary.json` for programs, ten lines for a person.
+
+use super::Run;
+use crate::error::Result;
+use crate::measure::stitches;
+use crate::output::file;
+use serde_json::json;
+use std::fmt::Write as _;
+
+impl Run<'_> {
+    /// Writes `summary.json`.
+    pub(super) fn write_summary(&self, verdict: &str) -> Result<()> {
+        let s = &self.simulation;
+        let (e, h) = (s.energies(), s.health());
+        let sum = |m: &[f64]| m.iter().sum::<f64>();
+        let first = s.model.first_thread;
+        let floor = |range: std::ops::Range<usize>| {
+            let mass = sum(&s.model.true_mass[range.clone()]);
+            if mass > 0.0 { sum(&s.model.mass[range]) / mass - 1.0 } else { 0.0 }
+        };
+        let summary = json!({
+            "verdict": verdict,
+            "case": self.loaded.case,
+            "defaults": self.loaded.defaults.iter().map(|(path, value)| json!({"path": path, "value": value})).collect::<Vec<_>>(),
+            "hexes": s.mesh.hexes(),
+            "beams": s.mesh.beams(),
+            "nodes": s.mesh.nodes.len(),
+            "backend": s.backend().describe(),
+            "steps": s.step(),
+            "time_s": s.time(),
+            "dt_smallest_s": self.dt_range[0],
+            "dt_largest_s": self.dt_range[1],
+            "dt_limit_s": h.dt_limit,
+            "contact_searches": s.searches(),
+            "wall_s": self.started.elapsed().as_secs_f64(),
+            "stage_wall_s": s.backend().timings().into_iter().map(|(name, t)| json!({"stage": name, "s": t})).collect::<Vec<_>>(),
+            "added_mass": {
+                "floor_solids": floor(0..first),
+                "floor_threads": floor(first..s.mesh.nodes.len()),
+                "contact_solids_largest": self.largest_added[0],
+                "contact_threads_largest": self.largest_added[1],
+            },
+            "worst_energy_balance": self.worst_balance,
+            "worst_kinetic_over_internal_in_shear": self.worst_kinetic,
+            "energies_mj": e.columns().into_iter().map(|(name, value)| (name.to_owned(), json!(value))).collect::<serde_json::Map<_, _>>(),
+            "state_hash": format!("{:016x}", s.state_hash()),
+            "frames": self.frames.iter().map(|(time, file)| json!({"time_s": time, "file": file})).collect::<Vec<_>>(),
+        });
+        let path = self.options.output.join("summary.json");
+        file::replace(&path, |w| serde_json::to_writer_pretty(w, &summary).map_err(Into::into))
+    }
+
+    /// The lines a person wants to read.
+    pub(super) fn lines(&self, verdict: &str) -> String {
+        let s = &self.simulation;
+        let (e, h) = (s.energies(), s.health());
+        let mut t = String::new();
+        let wall = self.started.elapsed().as_secs_f64();
+        // writing to a String does not fail
+        let _ = writeln!(t, "{}: {verdict}", self.loaded.case.title);
+        let _ = writeln!(
+            t,
+            "mesh       {} hexes, {} beams, {} nodes; {}",
+            s.mesh.hexes(),
+            s.mesh.beams(),
+            s.mesh.nodes.len(),
+            s.backend().describe()
+        );
+        let _ = writeln!(
+            t,
+            "time       {:.3} ms in {} steps of {:.2e} to {:.2e} s, {} contact searches; {wall:.1} s of wall time",
+            1e3 * s.time(),
+            s.step(),
+            self.dt_range[0],
+            self.dt_range[1],
+            s.searches()
+        );
+        for (name, sizes, target) in [
+            ("warp", &self.settled, "4.59 ± 0.13 / 0.38 ± 0.06 / 0.39 ± 0.10"),
+            ("weft", &self.settled_weft, "2.08 ± 0.08 / 0.38 ± 0.04 / 0.40 ± 0.04"),
+        ] {
+            if let Some(p) = sizes {
+                let _ = writeln!(
+                    t,
+                    "{name}       width / thickness / gap {:.2} / {:.2} / {:.2} mm before shear (PX35 tomography {target})",
+                    p.width.mean, p.thickness.mean, p.gap.mean
+                );
+            }
+        }
+        if let Ok(tension) = stitches::measure(&s.mesh, &s.tensions())
+            && !s.mesh.threads.is_empty()
+        {
+            let all = tension.all;
+            let _ = writeln!(
+                t,
+                "stitch     tension {:.3} / {:.3} / {:.3} N (min / mean / max), {:.0} % slack",
+                all.min_n,
+                all.mean_n,
+                all.max_n,
+                100.0 * all.slack_share
+            );
+        }
+        if !self.curve.is_empty() {
+            let at = |angle: f64| {
+                let near = self.curve.iter().filter(|(a, _)| (a.abs() - angle).abs() <= 1.0).map(|(_, f)| *f);
+                let (sum, count) = near.fold((0.0, 0), |(s, n), f| (s + f, n + 1));
+                (count > 0).then(|| format!("{:.4} at {angle}°", sum / f64::from(count)))
+            };
+            let forces: Vec<String> = [5.0, 15.0, 25.0, 35.0, 45.0].into_iter().filter_map(at).collect();
+            let _ = writeln!(t, "F_nor      {} N/mm (mean over ±1°)", forces.join(", "));
+        }
+        let _ = writeln!(
+            t,
+            "energy     internal {:.3} mJ, friction {:.3} mJ; balance within {:.2} %; kinetic under {:.2} % of internal in shear",
+            e.internal(),
+            e.friction,
+            100.0 * self.worst_balance,
+            100.0 * self.worst_kinetic
+        );
+        let _ = writeln!(
+            t,
+            "checks     smallest det F {:.3}; added mass at most {:.1} % of yarns, {:.1} % of threads; state {:016x}",
+            h.min_jacobian,
+            100.0 * self.largest_added[0],
+            100.0 * self.largest_added[1],
+            s.state_hash()
+        );
+        let picture = self.pictures.last().map_or(String::new(), |p| format!("; picture {}", p.display()));
+        let _ = write!(t, "results    {}{picture}", self.options.output.display());
+        t
+    }
+}
