@@ -1,0 +1,367 @@
+//! Contact: collisions, Hertz, a patch of uniform pressure, an edge, and the search against brute force.
+
+mod common;
+
+use common::{
+    Random, advance, bare, below, block, cross, loaded, momenta, near, neo_hookean, norm, positions, shaped, start,
+    with,
+};
+use serde_json::{Value, json};
+use std::f64::consts::PI;
+use tricot::case::steps::Precision::{self, F32, F64};
+use tricot::mesh::Mesh;
+use tricot::mesh::surface::Surface;
+use tricot::simulate::Simulation;
+
+fn scene(blocks: Value, contact: Value) -> Value {
+    with(bare(), &[("/domain/mesh/blocks", blocks), ("/effects/contact", contact)])
+}
+
+fn field(simulation: &Simulation, name: &str) -> Vec<f64> {
+    simulation.frame().node_fields.into_iter().find(|f| f.name == name).unwrap().values
+}
+
+/// Two blocks that meet askew, before and after.
+fn collide(friction: f64, precision: Precision, dt: f64) -> [Simulation; 2] {
+    let mut low = block("low", [5, 4, 3], [[0.0, 0.0, 0.0], [2.5, 2.0, 1.0]], 1e-9, neo_hookean(200.0, 0.3));
+    let mut high = block("high", [4, 5, 2], [[0.6, -0.7, 1.02], [2.4, 1.5, 1.9]], 1e-9, neo_hookean(300.0, 0.2));
+    low["velocity_mm_s"] = json!([0, 0, 1500]);
+    high["velocity_mm_s"] = json!([700, 300, -1000]);
+    let case = with(
+        scene(json!([low, high]), json!({ "yarn_penalty_n_mm3": 1000 })),
+        &[("/domain/mesh/friction", json!(friction)), ("/integration", json!({ "dt_s": dt, "energy_tolerance": 100 }))],
+    );
+    let before = start(&case, precision);
+    let mut after = start(&case, precision);
+    advance(&mut after, 1e-4);
+    [before, after]
+}
+
+#[test]
+fn a_collision_keeps_momentum_and_balances_energy() {
+    for (friction, precision, linear_allowed, angular_allowed) in
+        [(0.0, F64, 1e-13, 1e-6), (0.3, F64, 1e-13, 1e-4), (0.3, F32, 1e-5, 1e-4)]
+    {
+        let [before, after] = collide(friction, precision, 5e-8);
+        let ((p0, l0), (p1, l1)) = (momenta(&before), momenta(&after));
+        // over what each block carries alone
+        let mass: Vec<f64> = before.model.mass.clone();
+        let carried: f64 = before.velocities().iter().zip(&mass).map(|(v, m)| m * norm(*v)).sum();
+        let apart = |a: [f64; 3], b: [f64; 3]| norm([0, 1, 2].map(|k| a[k] - b[k])) / carried;
+        let name = format!("μ {friction}, {precision:?}");
+        below(&format!("{name}: change of linear momentum over the momentum of each"), apart(p0, p1), linear_allowed);
+        below(&format!("{name}: change of angular momentum over that times 1 mm"), apart(l0, l1), angular_allowed);
+        let e = after.energies();
+        println!(
+            "{name}: kinetic now {:.4e}, strain {:.4e}, friction {:.2e}, contact damping {:.2e} mJ",
+            e.kinetic,
+            e.internal(),
+            e.friction,
+            e.contact_damping
+        );
+        assert!(e.contact_damping > 0.0 && e.contact == 0.0, "the blocks did not meet and part");
+        assert!((e.friction > 0.0) == (friction > 0.0));
+        // kinetic energy is that of half a step earlier: the error falls with the step
+        let half = collide(friction, precision, 2.5e-8)[1].health().balance.abs();
+        let error = after.health().balance.abs();
+        println!("{name}: error of the energy balance {error:.1e}, with half the step {half:.1e}");
+        assert!(half < 0.6 * error && error < 5e-3, "energy balance {error:e}, with half the step {half:e}");
+    }
+}
+
+/// A half cylinder of radius 1 (of a rigid core of 0.5) pressed on a rigid plane: force per length, pressure and place of the
+/// nodes that touch.
+fn hertz(elements: [usize; 2], sink: f64) -> (f64, Vec<[f64; 2]>) {
+    let width = 0.05;
+    // angles dense around the lowest point, layers dense at the surface
+    let cylinder = shaped("cylinder", [1, elements[0], elements[1]], 1e-9, neo_hookean(1000.0, 0.3), |t| {
+        let u = 2.0 * t[1] - 1.0;
+        let angle = 1.5 * PI + 0.5 * PI * (0.08 * u + 0.92 * u.powi(3));
+        let radius = 1.0 - 0.5 * ((1.0 - t[2]) * (0.08 + 0.92 * (1.0 - t[2]).powi(2)));
+        [radius * angle.cos(), width * t[0], 1.0 + radius * angle.sin()]
+    });
+    let plane = block("plane", [1, 1, 1], [[-2.0, -1.0, -1.0], [2.0, 1.0, 0.0]], 1e-9, neo_hookean(1000.0, 0.3));
+    let (cylinder, core) = core_conditions(cylinder, width, sink);
+    let case = with(
+        scene(json!([plane, cylinder]), json!({ "yarn_penalty_n_mm3": 2e5, "skin_mm": 0.02 })),
+        &[
+            ("/domain/mesh/conditions", core),
+            ("/effects/damping", json!({ "rate_per_s": 1e6 })),
+            ("/steps", json!([{ "move": { "time_s": 1.5e-5 } }, { "hold": { "time_s": 1e-5 } }])),
+            ("/integration", json!({ "dt_max_s": 1e-8, "energy_tolerance": 100 })),
+        ],
+    );
+    let mut simulation = start(&case, F64);
+    advance(&mut simulation, 2.5e-5);
+    println!("{} steps", simulation.step());
+    let ratio = simulation.energies().kinetic / simulation.energies().internal();
+    assert!(ratio < 1e-4, "not at rest: {ratio:e}");
+    let (force, at) = (field(&simulation, "contact_force_n"), positions(&simulation));
+    let total = force.iter().sum::<f64>() / width;
+    let pressure = field(&simulation, "contact_pressure_mpa");
+    let touching = (0..at.len()).filter(|n| pressure[*n] > 0.0 && at[*n][1] < 1e-6).map(|n| [at[n][0], pressure[n]]);
+    (total, touching.collect())
+}
+
+/// Plane strain for all, a rigid core that sinks, a rigid plane.
+fn core_conditions(cylinder: Value, width: f64, sink: f64) -> (Value, Value) {
+    let nodes: Vec<[f64; 3]> = serde_json::from_value(cylinder["nodes"].clone()).unwrap();
+    let mut conditions = vec![
+        json!({ "within": [[-9, -9, -9], [9, 9, 9]], "body": "plane" }),
+        json!({ "within": [[-9, 0, -9], [9, width, 9]], "body": "cylinder", "components": [false, true, false] }),
+    ];
+    for x in nodes.iter().filter(|x| (x[0].hypot(x[2] - 1.0) - 0.5).abs() < 1e-9) {
+        conditions.push(json!({ "within": [x, x], "body": "cylinder", "displacement_mm": [0, 0, -sink] }));
+    }
+    (cylinder, json!(conditions))
+}
+
+#[test]
+fn a_cylinder_on_a_plane_follows_hertz() {
+    let modulus = 1000.0 / (1.0 - 0.09);
+    let hertz_of = |p: f64| ((4.0 * p / (PI * modulus)).sqrt(), (p * modulus / PI).sqrt());
+    let (b, p0) = hertz_of(1.0);
+    near("half width under 1 N/mm, mm", b, 0.034039, 1e-4);
+    near("largest pressure under 1 N/mm, MPa", p0, 18.703, 1e-4);
+    let (force, touching) = hertz([48, 14], 0.0045);
+    let (b, p0) = hertz_of(force);
+    let got = touching.iter().map(|t| t[1]).fold(0.0, f64::max);
+    let reach = touching.iter().map(|t| t[0].abs()).fold(0.0, f64::max);
+    println!("force {force:.4} N/mm, {} nodes across the contact", touching.len());
+    let mut worst = 0.0f64;
+    for [x, p] in &touching {
+        let expected = p0 * (1.0 - (x / b).powi(2)).max(0.0).sqrt();
+        println!("x {x:+.4} mm: pressure {p:.3}, Hertz {expected:.3} MPa");
+        worst = worst.max((p - expected).abs() / p0);
+    }
+    near("largest pressure, MPa", got, p0, 0.05);
+    near("half width, mm", reach, b, 0.15);
+    below("largest error of the pressure over p0", worst, 0.3);
+}
+
+#[test]
+fn pressure_through_meshes_that_do_not_match() {
+    let (young, sink, penalty) = (100.0, 0.02, 2000.0);
+    // 5 × 5 nodes of the ground, 0.8 mm apart, face a block of 7 × 7 elements; both surfaces push
+    let ground = block("ground", [10, 10, 1], [[-2.0, -2.0, -1.0], [6.0, 6.0, 0.0]], 1e-9, neo_hookean(young, 0.0));
+    let pressed = block("pressed", [7, 7, 4], [[0.0, 0.0, 0.0], [4.0, 4.0, 1.0]], 1e-9, neo_hookean(young, 0.0));
+    let case = with(
+        scene(json!([ground, pressed]), json!({ "yarn_penalty_n_mm3": penalty })),
+        &[
+            (
+                "/domain/mesh/conditions",
+                json!([
+                    { "within": [[-9, -9, -9], [9, 9, 9]], "body": "ground" },
+                    { "within": [[0, 0, 1], [4, 4, 1]], "body": "pressed", "displacement_mm": [0, 0, -sink] }
+                ]),
+            ),
+            ("/effects/damping", json!({ "rate_per_s": 1e5 })),
+            ("/steps", json!([{ "move": { "time_s": 1e-4 } }, { "hold": { "time_s": 2e-4 } }])),
+            ("/integration", json!({ "dt_max_s": 1e-7 })),
+        ],
+    );
+    let mut simulation = start(&case, F64);
+    advance(&mut simulation, 3e-4);
+    let kinetic = simulation.energies().kinetic / simulation.energies().internal();
+    assert!(kinetic < 1e-6, "not at rest: {kinetic:e}");
+    let force: f64 = simulation.reactions().iter().map(|f| f[2].max(0.0)).sum();
+    // the block in series with the two penalties, which are side by side
+    let mut mean = 0.0;
+    for _ in 0..50 {
+        let stretch = 1.0 - sink + mean / (2.0 * penalty);
+        mean = 0.5 * young * (1.0 / stretch - stretch);
+    }
+    near("mean pressure, MPa", force / 16.0, mean, 0.01);
+    let fields = simulation.frame().hex_fields;
+    let first = simulation.mesh.blocks[0].hexes();
+    let pressures: Vec<f64> = (first..simulation.mesh.hexes())
+        .map(|h| (2.0 * young * fields[..4].iter().map(|f| f.values[h]).sum::<f64>()).sqrt())
+        .collect();
+    for (layer, pressures) in pressures.chunks_exact(49).enumerate() {
+        let spread = pressures.iter().map(|p| (p / mean - 1.0).abs()).fold(0.0, f64::max);
+        println!("layer {layer} above the contact: pressure within {:.1} % of the mean", 100.0 * spread);
+        assert!(spread < 0.1, "pressure off by {spread}");
+    }
+}
+
+/// From the closest point of a bilinear face to a point, by sampling and shrinking.
+fn offset(corners: &[[f64; 3]; 4], point: [f64; 3]) -> [f64; 3] {
+    let at = |s: f64, t: f64| {
+        let w = [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t];
+        [0, 1, 2].map(|k| point[k] - (0..4).map(|a| w[a] * corners[a][k]).sum::<f64>())
+    };
+    let (mut s, mut t, mut step, mut best) = (0.5, 0.5, 0.5, at(0.5, 0.5));
+    for _ in 0..40 {
+        let (from_s, from_t) = (s, t);
+        for i in -4..=4 {
+            for j in -4..=4 {
+                let here = [from_s + f64::from(i) * 0.25 * step, from_t + f64::from(j) * 0.25 * step];
+                let here = here.map(|x: f64| x.clamp(0.0, 1.0));
+                let d = at(here[0], here[1]);
+                if norm(d) < norm(best) {
+                    (best, s, t) = (d, here[0], here[1]);
+                }
+            }
+        }
+        step *= 0.6;
+    }
+    best
+}
+
+/// What all faces within a radius do to a point: every one pushes by how deep it lies, away from its closest point. The sum
+/// of the depths, and the vector, mm.
+fn push(faces: &[[[f64; 3]; 4]], point: [f64; 3], radius: f64) -> (f64, [f64; 3]) {
+    let (mut depths, mut sum) = (0.0, [0.0; 3]);
+    for face in faces {
+        let away = offset(face, point);
+        let depth = (radius - norm(away)).max(0.0);
+        depths += depth;
+        sum = [0, 1, 2].map(|k| sum[k] + depth * away[k] / norm(away));
+    }
+    (depths, sum)
+}
+
+/// Faces of the first block with its nodes at places.
+fn faces(mesh: &Mesh, places: &[[f64; 3]]) -> Vec<[[f64; 3]; 4]> {
+    let surface = Surface::new(&mesh.blocks[0]);
+    (0..surface.ring())
+        .flat_map(|r| (0..mesh.blocks[0].slices).map(move |s| (r, s)))
+        .map(|(r, s)| surface.face(r, s).map(|n| places[n.node]))
+        .collect()
+}
+
+#[test]
+fn a_thread_passes_an_edge_smoothly() {
+    let (radius, height, penalty) = (0.2, 0.15, 50.0);
+    let slab = block("slab", [4, 4, 1], [[-1.0, -1.0, -0.5], [1.0, 1.0, 0.0]], 1e-9, neo_hookean(1000.0, 0.3));
+    let nodes = [[-0.3, 0.2, height], [0.37, 0.2, height]];
+    let thread =
+        json!({ "name": "thread", "nodes": nodes, "radius_mm": radius, "axial_n": 1, "linear_density_tex": 10 });
+    let case = with(
+        scene(json!([slab]), json!({ "thread_penalty_n_mm2": penalty, "damping_ratio": 0 })),
+        &[
+            ("/domain/mesh/threads", json!([thread])),
+            (
+                "/domain/mesh/conditions",
+                json!([
+                    { "within": [[-9, -9, -9], [9, 9, 9]], "body": "slab" },
+                    { "within": [[-9, -9, -9], [9, 9, 9]], "body": "thread", "displacement_mm": [0, 1.3, -0.02] }
+                ]),
+            ),
+            ("/steps", json!([{ "move": { "time_s": 1e-3 } }])),
+            ("/integration", json!({ "dt_s": 1e-7, "energy_tolerance": 100 })),
+        ],
+    );
+    for (precision, allowed) in [(F64, 1e-6), (F32, 1e-4)] {
+        let mut simulation = start(&case, precision);
+        let stiffness = penalty * 0.5 * 0.67;
+        let (mut worst, mut beyond, mut before) = (0.0f64, 0, None);
+        simulation
+            .advance(1e-3, |s| {
+                let first = s.mesh.first_thread_node();
+                let (x, v) = (positions(s)[first], s.velocities()[first]);
+                // the reaction belongs to the position before the last step
+                let dt = s.dt();
+                let (y, z) = (x[1] - v[1] * dt, x[2] - v[2] * dt);
+                let (depths, vector) = push(&faces(&s.mesh, &s.mesh.nodes), [x[0], y, z], radius);
+                let nodes = s.reactions().len();
+                let got = s.reactions()[nodes - 2];
+                worst = worst.max(norm([0, 1, 2].map(|k| got[k] - stiffness * vector[k])));
+                beyond += usize::from(y > 1.0 && depths > 0.0);
+                before = Some(depths);
+                false
+            })
+            .unwrap();
+        assert!(beyond > 5 && before == Some(0.0), "the edge was not passed: {beyond}, {before:?}");
+        below(
+            &format!(
+                "{precision:?}: force at the edge ({beyond} places) against all faces within reach, over that inside"
+            ),
+            worst / (stiffness * (radius - height)),
+            allowed,
+        );
+    }
+}
+
+#[test]
+fn the_search_finds_what_brute_force_finds() {
+    let (radius, penalty) = (0.12, 100.0);
+    // a yarn whose flat section bulges and that winds along its length
+    let yarn = shaped("yarn", [12, 10, 2], 1e-9, neo_hookean(1000.0, 0.3), |t| {
+        let across = 2.0 * t[1] - 1.0;
+        let half = 0.25 * (1.1 - across * across).max(0.2).sqrt();
+        [6.0 * t[0], 2.0 * across, half * (2.0 * t[2] - 1.0)]
+    });
+    let winding = |x: &[f64; 3]| {
+        let phase = x[0] * 1.1;
+        [
+            0.1 * (2.0 * x[1]).sin(),
+            0.3 * phase.sin() + 0.2 * x[2],
+            0.25 * (phase + 0.5 * x[1]).cos() + 0.05 * (5.0 * x[1]).sin(),
+        ]
+    };
+    let mesh = tricot::fabric::build(&loaded(&scene(json!([yarn]), Value::Null)).case, None).unwrap();
+    let now: Vec<[f64; 3]> = mesh
+        .nodes
+        .iter()
+        .map(|x| {
+            let w = winding(x);
+            [0, 1, 2].map(|k| x[k] + w[k])
+        })
+        .collect();
+    let faces = faces(&mesh, &now);
+    // points over the faces, on their outer side
+    let mut random = Random(17);
+    let mut points = vec![];
+    while points.len() < 400 {
+        let f = &faces[((random.draw() + 1.0) * 0.5 * faces.len() as f64) as usize % faces.len()];
+        let (s, t, high) = (0.5 + 0.5 * random.draw(), 0.5 + 0.5 * random.draw(), 0.1 + 0.1 * random.draw());
+        let w = [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t];
+        let on: [f64; 3] = [0, 1, 2].map(|k| (0..4).map(|a| w[a] * f[a][k]).sum());
+        let sub = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| a[k] - b[k]);
+        let normal = cross(sub(f[2], f[0]), sub(f[3], f[1]));
+        points.push([0, 1, 2].map(|k| on[k] + high * normal[k] / norm(normal)));
+    }
+    let threads: Vec<Value> = points
+        .chunks_exact(2)
+        .enumerate()
+        .map(|(i, ends)| {
+            json!({ "name": format!("t{i}"), "nodes": ends, "radius_mm": radius, "axial_n": 1, "linear_density_tex": 10 })
+        })
+        .collect();
+    let case = with(
+        scene(json!([yarn]), json!({ "thread_penalty_n_mm2": penalty, "thread_thread": false, "damping_ratio": 0 })),
+        &[
+            ("/domain/mesh/threads", json!(threads)),
+            ("/domain/mesh/conditions", json!([{ "within": [[-9, -9, -9], [9, 9, 9]] }])),
+            ("/integration", json!({ "dt_s": 1e-8, "energy_tolerance": 100, "penetration_tolerance": 100 })),
+        ],
+    );
+    for (precision, allowed) in [(F64, 1e-6), (F32, 1e-5)] {
+        let mut simulation = start(&case, precision);
+        let mut moved = vec![[0.0; 3]; simulation.mesh.nodes.len()];
+        for (moved, x) in moved.iter_mut().zip(&mesh.nodes) {
+            *moved = winding(x);
+        }
+        simulation.set_fluctuations(&moved);
+        advance(&mut simulation, 0.5e-8);
+        let force = field(&simulation, "contact_force_n");
+        let first = simulation.mesh.first_thread_node();
+        let (mut worst, mut touching, mut missed) = (0.0f64, 0, 0);
+        for (i, point) in points.iter().enumerate() {
+            let ends = &points[i / 2 * 2..][..2];
+            let length = norm([0, 1, 2].map(|k| ends[1][k] - ends[0][k]));
+            let (expected, _) = push(&faces, *point, radius);
+            let got = force[first + i] / (penalty * 0.5 * length);
+            touching += usize::from(expected > 0.0);
+            if (got - expected).abs() > allowed {
+                println!("point {i} at {point:.3?}: depths {expected:.6}, contact found {got:.6}");
+                missed += 1;
+            }
+            worst = worst.max((got - expected).abs());
+        }
+        assert!(touching > 100, "{touching} points touch");
+        println!("{missed} of {touching} touching points differ");
+        below(&format!("{precision:?}: depths of 400 points ({touching} touch) in 288 faces, mm"), worst, allowed);
+    }
+}
