@@ -92,6 +92,8 @@ pub mod status {
     pub const TOUCHING: [usize; 3] = [6, 7, 8];
     /// Largest speed of a node, bits of an f32, mm/s.
     pub const SPEED: usize = 9;
+    /// A node whose contact force outgrew its integer.
+    pub const CULPRIT: usize = 10;
     /// Size of the buffer.
     pub const SIZE: usize = 16;
 
@@ -121,7 +123,7 @@ pub fn of_key(key: u32) -> (usize, [i32; 2]) {
 #[inline(always)]
 pub fn add_pair<R: Real, const N: usize, const M: usize>(
     forces: &[AtomicI32],
-    flags: &AtomicU32,
+    status: &[AtomicU32],
     force: [R; 3],
     quantum: R,
     to: [(usize, R); N],
@@ -132,7 +134,8 @@ pub fn add_pair<R: Real, const N: usize, const M: usize>(
     for (k, force) in force.into_iter().enumerate() {
         let quanta = force / quantum;
         if !(quanta.abs() < limit) {
-            flags.fetch_or(status::FORCE_RANGE, Ordering::Relaxed);
+            status[status::FLAGS].fetch_or(status::FORCE_RANGE, Ordering::Relaxed);
+            status[status::CULPRIT].store(to[0].0 as u32, Ordering::Relaxed);
             return;
         }
         let mut rest = quanta.to_i32();

@@ -157,7 +157,7 @@ impl Kernel for Penalty {
                     add_virial(sum, force, apart);
                     let masters = [0, 1, 2, 3].map(|a| (corners.nodes[a], weights[a]));
                     let one = (slave, constant(1.0));
-                    add_pair(forces, &flags[status::FLAGS], force, real(params.force_quantum), [one], masters);
+                    add_pair(forces, flags, force, real(params.force_quantum), [one], masters);
                     let row_sum = constant(2.0) * (penalty + viscosity * per_step);
                     let nodes = masters.into_iter().chain([one]);
                     add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes);
@@ -183,7 +183,7 @@ impl Kernel for Penalty {
                 let force = scale(slid.elastic, -tangential);
                 add_virial(sum, force, apart);
                 let one = (slave, constant(1.0));
-                add_pair(forces, &flags[status::FLAGS], force, real(params.force_quantum), [one], masters);
+                add_pair(forces, flags, force, real(params.force_quantum), [one], masters);
             }
             sum[SUM_ENERGY] = energy;
             if touches {

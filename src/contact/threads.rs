@@ -269,7 +269,7 @@ impl Kernel for Force {
                     energy + constant(0.5) * (elastic_force * depth + tangential * dot(slid.elastic, slid.elastic));
                 let force = sub(scale(normal, normal_force), scale(slid.elastic, tangential));
                 add_virial(sum, force, between);
-                add_pair(forces, &flags[status::FLAGS], force, real(params.force_quantum), nodes, others);
+                add_pair(forces, flags, force, real(params.force_quantum), nodes, others);
                 let row_sum = constant(2.0) * (penalty + viscosity * per_step);
                 add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes.into_iter().chain(others));
                 raise(&flags[status::PENETRATION[2]], depth);

@@ -1,0 +1,99 @@
+//! Guards: each names the cause, where it was, its size, and what to change.
+
+use super::Simulation;
+use crate::contact::status;
+use crate::error::{Error, Guard, Result};
+
+impl Simulation {
+    pub(super) fn guards(&self) -> Result<()> {
+        let h = &self.health;
+        if !h.balance.is_finite() {
+            return Err(self.guard("non-finite", "the energy is not a number".into(), "lower integration.safety"));
+        }
+        if h.min_jacobian <= 0.0 {
+            let culprit = format!(
+                "hexahedron {} of {} has det F = {:.3e}",
+                h.worst_hex,
+                self.hex_owner(h.worst_hex),
+                h.min_jacobian
+            );
+            return Err(self.guard(
+                "inversion",
+                culprit,
+                "load more slowly, lower integration.safety or refine the mesh",
+            ));
+        }
+        let tolerance = self.case.integration.energy_tolerance;
+        // below a nJ rounding decides
+        if h.balance.abs() > tolerance && self.largest_flow > 1e-6 {
+            let culprit = format!(
+                "the energy balance is off by {:.1} % (tolerance {:.1} %)",
+                100.0 * h.balance,
+                100.0 * tolerance
+            );
+            return Err(self.guard("energy", culprit, "lower integration.safety or integration.dt_max_s"));
+        }
+        let allowed = self.case.integration.penetration_tolerance;
+        let l = &self.model.limits;
+        let kinds = [
+            ("a thread into a yarn", l.thread_radius),
+            ("a yarn into a yarn", l.yarn_thickness),
+            ("a thread into a thread", l.thread_radius),
+        ];
+        for ((what, size), depth) in kinds.into_iter().zip(h.penetration) {
+            if depth > allowed * size && self.schedule.load(self.time).radius >= 1.0 {
+                let culprit = format!("{what} by {depth:.4} mm (tolerance {:.4} mm)", allowed * size);
+                return Err(self.guard("penetration", culprit, "raise the contact penalties or load more slowly"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Name of the yarn that owns a hexahedron.
+    pub(super) fn hex_owner(&self, hex: usize) -> String {
+        let mut first = 0;
+        for block in &self.mesh.blocks {
+            first += block.hexes();
+            if hex < first {
+                return block.name.clone();
+            }
+        }
+        "?".into()
+    }
+
+    pub(super) fn guard(&self, cause: &str, culprit: String, advice: &str) -> Error {
+        Error::Guard(Guard { cause: cause.into(), step: self.step, time: self.time, culprit, advice: advice.into() })
+    }
+
+    pub(super) fn check_flags(&self, status: &[u32]) -> Result<()> {
+        let flags = status[status::FLAGS];
+        if flags & status::NOT_FINITE != 0 {
+            let culprit = match self.first_not_finite() {
+                Some(node) => format!("the position of node {node} ({}) is not a number", self.node_owner(node)),
+                None => "a position left the range of ±256 mm or is not a number".into(),
+            };
+            return Err(self.guard("non-finite", culprit, "lower integration.safety or integration.dt_max_s"));
+        }
+        if flags & status::FORCE_RANGE != 0 {
+            let node = status[status::CULPRIT] as usize;
+            let culprit = format!("the contact force at node {node} ({}) outgrew its integer", self.node_owner(node));
+            return Err(self.guard("force range", culprit, "lower integration.safety, or load more slowly"));
+        }
+        Ok(())
+    }
+
+    pub(super) fn first_not_finite(&self) -> Option<usize> {
+        let nodes = self.mesh.nodes.len();
+        self.backend.scalars(self.model.buffers.remainder).iter().position(|x| !x.is_finite()).map(|i| i % nodes)
+    }
+
+    /// Name of the body that owns a node.
+    pub fn node_owner(&self, node: usize) -> String {
+        let blocks = self.mesh.blocks.iter().map(|b| (b.first..b.first + b.count(), &b.name));
+        let threads = self.mesh.threads.iter().map(|t| (t.first..t.first + t.count, &t.name));
+        blocks
+            .chain(threads)
+            .find(|(range, _)| range.contains(&node))
+            .map_or_else(|| "?".into(), |(_, name)| name.clone())
+    }
+}
