@@ -160,7 +160,7 @@ impl<R: Real> Surface<'_, R> {
     ) -> Near<R> {
         let b = self.bodies[body];
         let wide = b.ring as i32 > 2 * RING_REACH;
-        let (touches_back, touches_on) = first.borders_within(reach);
+        let (touches_back, touches_on) = borders_within(&first.0, &first.1, reach);
         let steps = [(-1, touches_back.0), (1, touches_on.0)];
         let mut near = Near { count: 1, faces: [first; MOST_TOUCHED] };
         // around the ring, as long as faces are near; then the same in the slices before and after
@@ -232,28 +232,19 @@ impl<R: Real> Surface<'_, R> {
 }
 
 /// Which borders of a face are within reach of the slave: (ring, slice) on the low and on the high side.
-trait Borders<R> {
-    fn borders_within(&self, reach: R) -> ((bool, bool), (bool, bool));
-}
-
-impl<R: Real> Borders<R> for (Corners<R>, Closest<R>) {
-    #[inline(always)]
-    fn borders_within(&self, reach: R) -> ((bool, bool), (bool, bool)) {
-        let (corners, point) = self;
-        let p = patch(&corners.current);
-        let one = R::from_f64(1.0);
-        let room = (reach * reach - point.distance * point.distance).max(R::from_f64(0.0));
-        // a border is nearer than its distance along the face allows; the factor covers faces that are not rectangles
-        let within = |gap: R, tangent: Vector<R>| {
-            let along = gap * gap * dot(tangent, tangent) * R::from_f64(0.25);
-            along < room
-        };
-        let (t_slice, t_ring) = (fma(p[3], point.eta, p[1]), fma(p[3], point.xi, p[2]));
-        (
-            (within(point.eta + one, t_ring), within(point.xi + one, t_slice)),
-            (within(one - point.eta, t_ring), within(one - point.xi, t_slice)),
-        )
-    }
+#[inline(always)]
+fn borders_within<R: Real>(corners: &Corners<R>, point: &Closest<R>, reach: R) -> ((bool, bool), (bool, bool)) {
+    /// Faces are neither flat nor rectangles: their borders may be nearer than they look along the face by this factor.
+    const SLANT: f64 = 0.5;
+    let p = patch(&corners.current);
+    let one = R::from_f64(1.0);
+    let room = (reach * reach - point.distance * point.distance).max(R::from_f64(0.0));
+    let (slice, ring) = (fma(p[3], point.eta, p[1]), fma(p[3], point.xi, p[2]));
+    let within = |gap: R, tangent: Vector<R>| gap * gap * dot(tangent, tangent) * R::from_f64(SLANT * SLANT) < room;
+    (
+        (within(point.eta + one, ring), within(point.xi + one, slice)),
+        (within(one - point.eta, ring), within(one - point.xi, slice)),
+    )
 }
 
 /// Faces that a walk passes at most.
