@@ -385,7 +385,7 @@ impl<'a> Run<'a> {
         vtu::write_collection(&dir.join("run.pvd"), &self.frames)?;
         if self.loaded.case.output.pictures {
             let path = dir.join(format!("{:04}-{name}.png", self.frames.len() - 1));
-            draw(&s.mesh, &frame, &self.loaded.case.title, None, 1600, &path)?;
+            draw(&s.mesh, &frame, &self.loaded.case.title, None, 1200, &path)?;
             self.pictures.push(path);
         }
         Ok(())
