@@ -191,7 +191,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.csv");
         let mut table = Table::create(&path, YARNS).unwrap();
-        assert!(table.numbers(&[1.0]).unwrap_err().to_string().contains("1 cells for 14 columns"));
+        assert!(table.numbers(&[1.0]).unwrap_err().to_string().contains("1 cells for 16 columns"));
         assert!(Table::create(&path, &["a,b"]).unwrap_err().to_string().contains("t.csv"));
         assert!(Table::create(&folder.path().join("none/t.csv"), HISTORY).unwrap_err().to_string().contains("none"));
     }
