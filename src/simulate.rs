@@ -126,7 +126,14 @@ impl Simulation {
     /// # Errors
     /// Geometry that cannot be run.
     pub fn new(case: &Case, friction: f64, mesh: Mesh, make: Make) -> Result<Self> {
-        let capacity = Capacity::default();
+        Self::with_capacity(case, friction, mesh, make, Capacity::default())
+    }
+
+    /// A scene at rest at time zero whose contact tables start at a given size; they grow when they must.
+    ///
+    /// # Errors
+    /// Geometry that cannot be run.
+    pub fn with_capacity(case: &Case, friction: f64, mesh: Mesh, make: Make, capacity: Capacity) -> Result<Self> {
         let model = plan::build(case, friction, &mesh, capacity)?;
         let backend = make.backend(&model);
         let slip = vec![0.0; model.slaves.len()];
@@ -266,7 +273,12 @@ impl Simulation {
         if self.model.plan.search.is_empty() {
             return Ok(());
         }
-        for _ in 0..6 {
+        // what an overflowing search drops depends on the order in which cells were filled: it must leave no trace
+        let b = &self.model.buffers;
+        let state = [b.contact_keys, b.contact_state, b.pair_keys, b.pair_state];
+        let mut known: Vec<(Buffer, Vec<u8>)> =
+            state.into_iter().flatten().map(|buffer| (buffer, self.backend.bytes(buffer))).collect();
+        for _ in 0..8 {
             let row = self.schedule.row(self.time, self.dt, self.dt_before);
             self.backend.run(&self.model.plan.search, &[row]);
             let status = self.backend.uints(self.model.buffers.status);
@@ -286,7 +298,13 @@ impl Simulation {
                 capacity.slots = (capacity.slots * 2).min(16);
                 capacity.beam_slots *= 2;
             }
+            for (buffer, bytes) in &known {
+                self.backend.set_bytes(*buffer, bytes);
+            }
             self.grow(capacity)?;
+            for (buffer, bytes) in &mut known {
+                *bytes = self.backend.bytes(*buffer);
+            }
         }
         Err(self.guard(
             "contact overflow",

@@ -5,9 +5,11 @@ mod common;
 use common::{advance, loaded};
 use serde_json::{Value, json};
 use tricot::case::steps::Precision;
+use tricot::fabric;
 use tricot::kernel::lane::Isa;
+use tricot::plan::Capacity;
 use tricot::run;
-use tricot::simulate::Make;
+use tricot::simulate::{Make, Simulation};
 
 /// A coarse cell of the shipped fabric, with every effect, tightened fast so that threads and yarns touch.
 fn cell() -> Value {
@@ -45,5 +47,22 @@ fn bits_do_not_depend_on_threads_or_instruction_set() {
             hashes.push(hash);
         }
         assert!(hashes.iter().all(|h| *h == hashes[0]), "{precision:?}: {hashes:x?}");
+    }
+}
+
+#[test]
+fn contact_tables_that_overflow_and_grow_leave_no_trace() {
+    let loaded = loaded(&cell());
+    let positions = |capacity: Capacity| {
+        let mesh = fabric::build(&loaded.case, loaded.fabric.as_ref()).unwrap();
+        let friction = loaded.fabric.as_ref().unwrap().friction;
+        let make = Make { threads: 2, ..Make::default() };
+        let mut simulation = Simulation::with_capacity(&loaded.case, friction, mesh, make, capacity).unwrap();
+        advance(&mut simulation, 2.5e-4);
+        simulation.fluctuations()
+    };
+    let roomy = positions(Capacity::default());
+    for tight in [Capacity { cell: 6, slots: 2, beam_slots: 1 }, Capacity { cell: 12, slots: 1, beam_slots: 2 }] {
+        assert_eq!(positions(tight), roomy, "{tight:?}");
     }
 }

@@ -107,7 +107,7 @@ pub struct Capacity {
 
 impl Default for Capacity {
     fn default() -> Self {
-        Self { cell: 96, slots: 6, beam_slots: 8 }
+        Self { cell: 192, slots: 12, beam_slots: 16 }
     }
 }
 
