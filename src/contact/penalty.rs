@@ -6,6 +6,7 @@ use super::friction::slide;
 use super::{BODY, EMPTY, Params, add_pair, add_stiffness, of_key, status};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
+use crate::kernel::row::Row;
 use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
 use std::ops::Range;
@@ -48,6 +49,30 @@ const STATUS: usize = 14;
 /// Contact forces of slave nodes.
 pub struct Penalty;
 
+/// What presses two bodies apart.
+pub struct Press<R> {
+    /// Penalty times depth, N.
+    pub elastic_force: R,
+    /// With damping, never pulling, N.
+    pub pressing: R,
+    /// Row sum of stiffness and damping for the time step, N/mm.
+    pub row_sum: R,
+}
+
+/// Penalty force of a pair at `depth` (mm) with `approach` (mm/s, negative when closing) and the inverse of its joint mass
+/// `inverse` (1/tonne).
+#[inline(always)]
+pub fn press<R: Real>(params: &Params, row: &Row<R>, penalty: R, depth: R, inverse: R, approach: R) -> Press<R> {
+    let two = R::from_f64(2.0);
+    let viscosity = R::from_f64(f64::from(params.damping)) * two * (penalty / inverse).sqrt();
+    let elastic_force = penalty * depth;
+    Press {
+        elastic_force,
+        pressing: (elastic_force - viscosity * approach).max(R::from_f64(0.0)),
+        row_sum: two * (penalty + viscosity * (two / row.dt)),
+    }
+}
+
 /// Subtracts force ⊗ ΔX from the sum that makes the homogenised stress.
 #[inline(always)]
 pub fn add_virial<R: Real>(sum: &mut [R], force: Vector<R>, apart: Vector<R>) {
@@ -83,7 +108,6 @@ impl Kernel for Penalty {
         let mut sums = io.own::<L::Scalar>(SUM);
         let (forces, stiffness, flags) = (io.atomics(FORCE), io.atomics(STIFFNESS), io.atomic_uints(STATUS));
         let elapsed = io.row.dt_mid + io.row.dt_mid - io.row.dt;
-        let per_step = constant(2.0) / io.row.dt;
         for item in items {
             let slot_keys = keys.item(0, item);
             if slot_keys[0] == EMPTY {
@@ -145,9 +169,8 @@ impl Kernel for Penalty {
                     }
                     let motion = add(motion, apply(&io.row.rate, apart));
                     let approach = dot(motion, normal);
-                    let viscosity = real(params.damping) * constant(2.0) * (penalty / inverse).sqrt();
-                    let elastic_force = penalty * depth;
-                    let pressing = (elastic_force - viscosity * approach).max(zero);
+                    let Press { elastic_force, pressing, row_sum } =
+                        press(&params, io.row, penalty, depth, inverse, approach);
                     sum[SUM_DAMPING] = sum[SUM_DAMPING] + (elastic_force - pressing) * approach * elapsed;
                     sum[SUM_RADIUS] = sum[SUM_RADIUS] + elastic_force * full_radius * io.row.radius_increment;
                     energy = energy + constant(0.5) * elastic_force * depth;
@@ -158,7 +181,6 @@ impl Kernel for Penalty {
                     let masters = [0, 1, 2, 3].map(|a| (corners.nodes[a], weights[a]));
                     let one = (slave, constant(1.0));
                     add_pair(forces, flags, force, real(params.force_quantum), [one], masters);
-                    let row_sum = constant(2.0) * (penalty + viscosity * per_step);
                     let nodes = masters.into_iter().chain([one]);
                     add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes);
                     raise(&flags[status::PENETRATION[usize::from(!is_thread)]], depth);

@@ -5,7 +5,7 @@
 
 use super::friction::slide;
 use super::grid::{BOX, absolute, cell_index, cells, inverse, pull_back};
-use super::penalty::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial};
+use super::penalty::{Press, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, press};
 use super::{EMPTY, Params, add_pair, add_stiffness, key, of_key, status};
 use crate::elements::beam2;
 use crate::kernel::lane::{Lane, Real};
@@ -206,7 +206,6 @@ impl Kernel for Force {
         let (forces, stiffness, flags) = (io.atomics(12), io.atomics(13), io.atomic_uints(14));
         let radius = real(params.thread_radius) * io.row.radius;
         let elapsed = io.row.dt_mid + io.row.dt_mid - io.row.dt;
-        let per_step = constant(2.0) / io.row.dt;
         for beam in items {
             let slot_keys = keys.item(0, beam);
             if slot_keys[0] == EMPTY {
@@ -253,9 +252,8 @@ impl Kernel for Force {
                 let between = sub(scale(rest, s), fma(direction_rest, t, apart_rest));
                 let motion = add(motion, apply(&io.row.rate, between));
                 let approach = dot(motion, normal);
-                let viscosity = real(params.damping) * constant(2.0) * (penalty / inverse).sqrt();
-                let elastic_force = penalty * depth;
-                let normal_force = (elastic_force - viscosity * approach).max(zero);
+                let Press { elastic_force, pressing: normal_force, row_sum } =
+                    press(&params, io.row, penalty, depth, inverse, approach);
                 sum[SUM_DAMPING] = sum[SUM_DAMPING] + (elastic_force - normal_force) * approach * elapsed;
                 let growth = constant(2.0) * real(params.thread_radius) * io.row.radius_increment;
                 sum[SUM_RADIUS] = sum[SUM_RADIUS] + elastic_force * growth;
@@ -270,7 +268,6 @@ impl Kernel for Force {
                 let force = sub(scale(normal, normal_force), scale(slid.elastic, tangential));
                 add_virial(sum, force, between);
                 add_pair(forces, flags, force, real(params.force_quantum), nodes, others);
-                let row_sum = constant(2.0) * (penalty + viscosity * per_step);
                 add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes.into_iter().chain(others));
                 raise(&flags[status::PENETRATION[2]], depth);
             }

@@ -31,7 +31,6 @@ pub struct Row<R> {
     pub motion: R,
     /// Bound on how fast two near bodies can approach each other, mm/s.
     pub approach: R,
-    pub reserved: [R; 4],
 }
 
 impl Row<f64> {
@@ -51,7 +50,6 @@ impl Row<f64> {
             damping_thread: r(self.damping_thread),
             motion: r(self.motion),
             approach: r(self.approach),
-            reserved: self.reserved.map(r),
         }
     }
 }

@@ -14,6 +14,18 @@ pub(crate) mod sample;
 pub mod surface;
 pub mod vector;
 
+/// (ξ, η, ζ) of the eight corners of a hexahedron, in the order of [`Block::corners`].
+pub const CORNER_SIGNS: [[f64; 3]; 8] = [
+    [-1.0, -1.0, -1.0],
+    [1.0, -1.0, -1.0],
+    [1.0, 1.0, -1.0],
+    [-1.0, 1.0, -1.0],
+    [-1.0, -1.0, 1.0],
+    [1.0, -1.0, 1.0],
+    [1.0, 1.0, 1.0],
+    [-1.0, 1.0, 1.0],
+];
+
 /// Everything that is discretised, in its reference position. Lengths in mm.
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {

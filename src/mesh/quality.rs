@@ -1,7 +1,7 @@
 //! What a mesh is worth before anything moves: shape of hexahedra, volumes, lengths, masses.
 
 use super::vector::{Vector, cross, dot, norm, scale, sub, unit};
-use super::{Block, Mesh, Part, Ply, Thread};
+use super::{Block, CORNER_SIGNS, Mesh, Part, Ply, Thread};
 
 /// 1 g/m² in tonne/mm².
 pub const TONNES_PER_MM2: f64 = 1e-12;
@@ -29,20 +29,10 @@ pub fn volume(mesh: &Mesh, block: &Block) -> f64 {
 }
 
 fn hex_volume(hex: &[Vector; 8]) -> f64 {
-    const SIGNS: [[f64; 3]; 8] = [
-        [-1.0, -1.0, -1.0],
-        [1.0, -1.0, -1.0],
-        [1.0, 1.0, -1.0],
-        [-1.0, 1.0, -1.0],
-        [-1.0, -1.0, 1.0],
-        [1.0, -1.0, 1.0],
-        [1.0, 1.0, 1.0],
-        [-1.0, 1.0, 1.0],
-    ];
     let gauss = 1.0 / 3f64.sqrt();
     let at = |point: Vector| {
         let mut columns = [[0.0; 3]; 3];
-        for (corner, sign) in hex.iter().zip(SIGNS) {
+        for (corner, sign) in hex.iter().zip(CORNER_SIGNS) {
             let factor = [0, 1, 2].map(|i| 1.0 + sign[i] * point[i]);
             for (i, column) in columns.iter_mut().enumerate() {
                 let slope = sign[i] * factor[(i + 1) % 3] * factor[(i + 2) % 3] / 8.0;
@@ -51,7 +41,7 @@ fn hex_volume(hex: &[Vector; 8]) -> f64 {
         }
         dot(cross(columns[0], columns[1]), columns[2])
     };
-    SIGNS.iter().map(|&sign| at(scale(sign, gauss))).sum()
+    CORNER_SIGNS.iter().map(|&sign| at(scale(sign, gauss))).sum()
 }
 
 /// Corner positions of every hexahedron of a block.

@@ -5,7 +5,7 @@ use crate::elements::hex8::{Header, LANES};
 use crate::error::{Error, Result};
 use crate::kernel::position::{QUANTUM, quanta};
 use crate::materials::{self, Law};
-use crate::mesh::{Block, Mesh, Seen};
+use crate::mesh::{Block, CORNER_SIGNS, Mesh, Seen};
 use std::collections::{BTreeMap, HashMap};
 
 /// Tables of all hexahedra of a mesh.
@@ -45,16 +45,6 @@ struct Hex {
 type Point = ([[f64; 3]; 3], f64);
 
 const GAUSS: f64 = 0.577_350_269_189_625_8;
-const SIGNS: [[f64; 3]; 8] = [
-    [-1.0, -1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [1.0, 1.0, -1.0],
-    [-1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, 1.0, 1.0],
-    [-1.0, 1.0, 1.0],
-];
 
 impl Solids {
     /// Tables of a mesh.
@@ -181,7 +171,7 @@ impl Solids {
             for corner in 0..8 {
                 let mut weight = 1.0;
                 let mut section = 1.0;
-                for (k, sign) in SIGNS[corner].iter().enumerate() {
+                for (k, sign) in CORNER_SIGNS[corner].iter().enumerate() {
                     let factor = 0.5 * (1.0 + sign * GAUSS * if point >> k & 1 == 1 { 1.0 } else { -1.0 });
                     weight *= factor;
                     section *= if k == 0 { 1.0 } else { factor };
@@ -192,7 +182,7 @@ impl Solids {
                 axial[corner] += fibre_stiffness * volume * section * slope * slope;
             }
         }
-        for (corner, k) in axial.into_iter().enumerate().filter(|(corner, _)| SIGNS[*corner][0] < 0.0) {
+        for (corner, k) in axial.into_iter().enumerate().filter(|(corner, _)| CORNER_SIGNS[*corner][0] < 0.0) {
             self.line_stiffness[hex.corners[corner].node] += k;
         }
     }
@@ -232,7 +222,7 @@ fn points_of(edges: &[[i32; 3]], frame: &[[f64; 3]; 3]) -> std::result::Result<[
         let at = [0, 1, 2].map(|k| if point >> k & 1 == 1 { GAUSS } else { -GAUSS });
         // jacobian[j][d] = ∂X_j/∂ξ_d
         let mut j = [[0.0; 3]; 3];
-        for (sign, x) in SIGNS.iter().zip(&local) {
+        for (sign, x) in CORNER_SIGNS.iter().zip(&local) {
             let f = [0, 1, 2].map(|k| 0.5 * (1.0 + sign[k] * at[k]));
             let slope = [0.5 * sign[0] * f[1] * f[2], 0.5 * sign[1] * f[0] * f[2], 0.5 * sign[2] * f[0] * f[1]];
             for (row, x) in j.iter_mut().zip(x) {

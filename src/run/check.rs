@@ -4,7 +4,6 @@ use super::scene;
 use crate::case::domain::Domain;
 use crate::case::read::Loaded;
 use crate::error::Result;
-use crate::plan::{self, Capacity};
 use crate::simulate::{Make, Simulation};
 use std::fmt::Write as _;
 use std::time::Instant;
@@ -12,9 +11,8 @@ use std::time::Instant;
 /// Sizes and cost of a case; with `explain` the defaults in use and every stage of its plan.
 pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
     let (mesh, friction) = scene(loaded)?;
-    let model = plan::build(&loaded.case, friction, &mesh, Capacity::default())?;
-    let bytes: usize = model.plan.buffers.iter().map(|b| 4 * b.len).sum();
     let mut probe = Simulation::new(&loaded.case, friction, mesh, Make::default())?;
+    let bytes: usize = probe.model.plan.buffers.iter().map(|b| 4 * b.len).sum();
     probe.advance(0.0, |_| false)?;
     let (dt, end) = (probe.dt(), probe.schedule.end());
     // a few steps for the expected time; the first burst warms up
@@ -53,7 +51,7 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
         probe.backend().describe()
     );
     if explain {
-        let plan = &model.plan;
+        let plan = &probe.model.plan;
         for (list, stages) in
             [("step", &plan.step), ("watch", &plan.watch), ("search", &plan.search), ("diagnose", &plan.diagnose)]
         {
