@@ -16,6 +16,10 @@ pub enum Error {
     Guard(Guard),
     /// A request that this build or machine cannot serve.
     Unsupported(String),
+    /// A shader that cannot be put together or compiled: file, line and what is wrong.
+    Shader(String),
+    /// The GPU failed during a run: lost, out of memory, or a fault of its driver.
+    Device(String),
 }
 
 /// Why a guard stopped a run. Results up to the last output before it stay on disk.
@@ -52,13 +56,15 @@ impl Error {
         Error::File { path: path.as_ref().to_path_buf(), message: source.to_string() }
     }
 
-    /// Exit code of the program: 2 bad input, 3 stopped by a guard, 4 files, 5 unsupported.
+    /// Exit code of the program: 2 bad input, 3 stopped by a guard, 4 files, 5 unsupported, 6 a GPU that
+    /// failed.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Case { .. } | Error::Geometry { .. } => 2,
             Error::Guard(_) => 3,
             Error::File { .. } => 4,
-            Error::Unsupported(_) => 5,
+            Error::Unsupported(_) | Error::Shader(_) => 5,
+            Error::Device(_) => 6,
         }
     }
 }
@@ -70,7 +76,8 @@ impl fmt::Display for Error {
             Error::Geometry { what, message } => write!(f, "{what}: {message}"),
             Error::File { path, message } => write!(f, "{}: {message}", path.display()),
             Error::Guard(guard) => write!(f, "{guard}"),
-            Error::Unsupported(message) => f.write_str(message),
+            Error::Unsupported(message) | Error::Device(message) => f.write_str(message),
+            Error::Shader(message) => write!(f, "shader {message}"),
         }
     }
 }

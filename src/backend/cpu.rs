@@ -7,7 +7,7 @@ use super::Backend;
 use crate::kernel::buffer::{Array, Buffer, Description};
 use crate::kernel::lane::{Isa, Real};
 use crate::kernel::row::Row;
-use crate::kernel::stage::{Access, Binding, CpuKernel, Io, Stage};
+use crate::kernel::stage::{Access, Binding, Code, Io, Stage};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -25,20 +25,20 @@ pub struct Cpu<R: Real> {
 
 /// A precision that the CPU can run: which of a kernel's functions it is.
 pub trait Precision: Real {
-    fn function(kernel: &CpuKernel) -> fn(&Io<Self>, std::ops::Range<usize>);
+    fn function(kernel: &Code) -> fn(&Io<Self>, std::ops::Range<usize>);
     const NAME: &'static str;
 }
 
 impl Precision for f32 {
     const NAME: &'static str = "f32";
-    fn function(kernel: &CpuKernel) -> fn(&Io<f32>, std::ops::Range<usize>) {
+    fn function(kernel: &Code) -> fn(&Io<f32>, std::ops::Range<usize>) {
         kernel.f32
     }
 }
 
 impl Precision for f64 {
     const NAME: &'static str = "f64";
-    fn function(kernel: &CpuKernel) -> fn(&Io<f64>, std::ops::Range<usize>) {
+    fn function(kernel: &Code) -> fn(&Io<f64>, std::ops::Range<usize>) {
         kernel.f64
     }
 }

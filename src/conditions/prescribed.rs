@@ -2,6 +2,7 @@
 
 use crate::dynamics::integrate::factors;
 use crate::kernel::lane::{Lane, Real};
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
@@ -35,6 +36,8 @@ pub struct Prescribed;
 pub struct Hold;
 
 impl Kernel for Prescribed {
+    const SHADER: Shader = Shader::new("conditions/prescribed", "prescribed");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { first_thread, gravity } = io.params();
@@ -76,6 +79,8 @@ impl Kernel for Prescribed {
 }
 
 impl Kernel for Hold {
+    const SHADER: Shader = Shader::new("conditions/prescribed", "hold");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let nodes = io.uints(NODES);

@@ -11,6 +11,7 @@ use super::{EMPTY, Params, key, status};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::QUANTUM;
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{add, norm, scale, sub};
 use std::ops::Range;
@@ -48,6 +49,8 @@ struct Best<R> {
 }
 
 impl Kernel for Candidates {
+    const SHADER: Shader = Shader::new("contact/candidates", "candidates");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();

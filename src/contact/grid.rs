@@ -10,6 +10,7 @@ use crate::elements::beam2;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::QUANTUM;
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use std::ops::Range;
 use std::sync::atomic::Ordering;
@@ -41,6 +42,8 @@ pub struct Clear;
 pub struct Fill;
 
 impl Kernel for Clear {
+    const SHADER: Shader = Shader::new("contact/grid", "clear");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let mut counts = io.own::<u32>(0);
@@ -100,6 +103,8 @@ pub fn cell_index(params: &Params, x: i32, y: i32) -> usize {
 }
 
 impl Kernel for Fill {
+    const SHADER: Shader = Shader::new("contact/grid", "fill");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();

@@ -7,6 +7,7 @@ use super::{BODY, EMPTY, Params, add_pair, add_stiffness, of_key, status};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::row::Row;
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
 use std::ops::Range;
@@ -85,6 +86,8 @@ pub fn add_virial<R: Real>(sum: &mut [R], force: Vector<R>, apart: Vector<R>) {
 }
 
 impl Kernel for Penalty {
+    const SHADER: Shader = Shader::new("contact/penalty", "penalty");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();

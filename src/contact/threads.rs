@@ -11,6 +11,7 @@ use crate::elements::beam2;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::position::QUANTUM;
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale, sub};
 use std::ops::Range;
@@ -102,6 +103,8 @@ pub fn closest_points<R: Real>(d1: Vector<R>, d2: Vector<R>, start: Vector<R>) -
 }
 
 impl Kernel for Pairs {
+    const SHADER: Shader = Shader::new("contact/threads", "pairs");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         const COUNTS: usize = 7;
@@ -189,6 +192,8 @@ impl Kernel for Pairs {
 }
 
 impl Kernel for Force {
+    const SHADER: Shader = Shader::new("contact/threads", "force");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         const VELOCITY: usize = 7;

@@ -4,6 +4,7 @@ use super::status;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
 use crate::kernel::position::difference;
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::dot;
 use std::ops::Range;
@@ -22,6 +23,8 @@ pub struct Remember;
 pub struct Travel;
 
 impl Kernel for Remember {
+    const SHADER: Shader = Shader::new("contact/travel", "remember");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let (quanta, remainder) = (io.ints(QUANTA), io.scalars(REMAINDER));
@@ -38,6 +41,8 @@ impl Kernel for Remember {
 }
 
 impl Kernel for Travel {
+    const SHADER: Shader = Shader::new("contact/travel", "travel");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         const STATUS: usize = 5;

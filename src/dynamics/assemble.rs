@@ -7,6 +7,7 @@
 use crate::contact::status::CONTACT_RATE;
 use crate::elements::hex8::LANES;
 use crate::kernel::lane::{Lane, Real};
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel, raise};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
@@ -58,6 +59,15 @@ const STATUS: usize = 11;
 pub struct Assemble<const CONTACT: bool, const MASS_ADDED: bool>;
 
 impl<const CONTACT: bool, const MASS_ADDED: bool> Kernel for Assemble<CONTACT, MASS_ADDED> {
+    const SHADER: Shader = Shader {
+        defines: match (CONTACT, MASS_ADDED) {
+            (true, true) => &["CONTACT", "MASS_ADDED"],
+            (true, false) => &["CONTACT"],
+            _ => &[],
+        },
+        ..Shader::new("dynamics/assemble", "assemble")
+    };
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();

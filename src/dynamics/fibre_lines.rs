@@ -13,6 +13,7 @@
 use crate::elements::hex8::LANES;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::QUANTUM;
+use crate::kernel::shader::{Shader, WORKGROUP};
 use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
 use std::cell::RefCell;
@@ -75,6 +76,12 @@ const RIGHT: usize = 10;
 const ROWS: usize = 11;
 
 impl Kernel for FibreLines {
+    const SHADER: Shader = Shader {
+        // a workgroup for each line
+        invocations: LANES * WORKGROUP,
+        ..Shader::new("dynamics/fibre_lines", "fibre_lines")
+    };
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let groups: &[Group] = bytemuck::cast_slice(io.uints(GROUPS));

@@ -6,6 +6,7 @@
 
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::carry;
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
@@ -16,7 +17,6 @@ use std::ops::Range;
 pub struct Params {
     /// First node of a thread.
     pub first_thread: u32,
-    pub unused: u32,
     /// Gravity, mm/s².
     pub gravity: [f32; 3],
 }
@@ -50,6 +50,16 @@ pub fn factors<R: Real>(damping: R, dt: R) -> (R, R) {
 }
 
 impl<const LINES: bool, const GRAVITY: bool> Kernel for Integrate<LINES, GRAVITY> {
+    const SHADER: Shader = Shader {
+        defines: match (LINES, GRAVITY) {
+            (true, true) => &["LINES", "GRAVITY"],
+            (true, false) => &["LINES"],
+            (false, true) => &["GRAVITY"],
+            (false, false) => &[],
+        },
+        ..Shader::new("dynamics/integrate", "integrate")
+    };
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();

@@ -3,6 +3,7 @@
 
 use crate::elements::hex8::LANES;
 use crate::kernel::lane::{Lane, Real};
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
@@ -30,6 +31,8 @@ const LIMIT: usize = 4;
 pub struct ElementLimit;
 
 impl Kernel for ElementLimit {
+    const SHADER: Shader = Shader::new("dynamics/time_step", "element_limit");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { first_thread } = io.params();

@@ -5,6 +5,7 @@
 
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Displacements;
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{add, apply, dot, norm, scale};
 use std::ops::Range;
@@ -54,6 +55,9 @@ pub fn add_virial<R: Real>(to: &mut [R], force: [R; 3], reference: [R; 3]) {
 }
 
 impl<const PERIODIC: bool> Kernel for Beam2<PERIODIC> {
+    const SHADER: Shader =
+        Shader { defines: if PERIODIC { &["PERIODIC"] } else { &[] }, ..Shader::new("elements/beam2", "force") };
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let w = Displacements::new(io, QUANTA, REMAINDER);

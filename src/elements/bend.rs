@@ -7,6 +7,7 @@
 use super::beam2::{TABLE, add_virial, vector};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Displacements;
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{add, cross, dot, norm, scale, sub};
 use std::ops::Range;
@@ -40,6 +41,9 @@ pub fn smoothed(t: f64) -> f64 {
 }
 
 impl<const PERIODIC: bool> Kernel for Bend<PERIODIC> {
+    const SHADER: Shader =
+        Shader { defines: if PERIODIC { &["PERIODIC"] } else { &[] }, ..Shader::new("elements/bend", "force") };
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let w = Displacements::new(io, QUANTA, REMAINDER);

@@ -10,6 +10,7 @@
 
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::difference;
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use crate::materials::{Material, PARAMETERS, Tensor, jacobian};
 use bytemuck::{Pod, Zeroable};
@@ -281,6 +282,11 @@ fn turn<L: Lane>(q: &Tensor<L>, a: &Tensor<L>, out: bool) -> Tensor<L> {
     full
 }
 
+/// The twin of an entry point for a law, one lane an invocation.
+const fn shader<M: Material>(entry: &'static str) -> Shader {
+    Shader { law: Some(M::SHADER), invocations: LANES, ..Shader::new("elements/hex8", entry) }
+}
+
 /// Something to do at each Gauss point of one register of hexahedra.
 trait Visitor<L: Lane> {
     fn point(&mut self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, volume: L);
@@ -395,6 +401,8 @@ impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
+    const SHADER: Shader = Shader { defines: if PERIODIC { &["PERIODIC"] } else { &[] }, ..shader::<M>("force") };
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { nodes } = io.params();
@@ -438,6 +446,8 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
 }
 
 impl<M: Material> Kernel for Energy<M> {
+    const SHADER: Shader = shader::<M>("energy");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { nodes } = io.params();
@@ -463,6 +473,8 @@ impl<M: Material> Kernel for Energy<M> {
 }
 
 impl<M: Material> Kernel for Bound<M> {
+    const SHADER: Shader = shader::<M>("bound");
+
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { nodes } = io.params();

@@ -7,5 +7,6 @@ pub mod math;
 pub mod node;
 pub mod position;
 pub mod row;
+pub mod shader;
 pub mod stage;
 pub mod vector;

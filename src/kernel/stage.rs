@@ -3,6 +3,7 @@
 use super::buffer::{Buffer, Description};
 use super::lane::{Isa, Lane, Real, Work};
 use super::row::Row;
+use super::shader::Shader;
 use bytemuck::Pod;
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -36,7 +37,9 @@ pub struct Stage {
     pub writes: Vec<(Buffer, Access)>,
     /// Small constants of the stage, laid out as the kernel's `Params`.
     pub params: Vec<u8>,
-    pub kernel: CpuKernel,
+    /// Constants in the text of the shader.
+    pub constants: Vec<(&'static str, usize)>,
+    pub kernel: Code,
     /// Whether it must wait for the stages before it; else it may run beside them.
     pub waits: bool,
 }
@@ -57,19 +60,22 @@ pub struct Plan {
 
 /// A kernel, written once for every precision and register width.
 pub trait Kernel: 'static {
+    /// Its WGSL twin.
+    const SHADER: Shader;
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>);
 }
 
-/// A kernel as function pointers.
+/// A kernel as function pointers for the CPU, and where its WGSL twin is.
 #[derive(Clone, Copy)]
-pub struct CpuKernel {
+pub struct Code {
     pub f32: fn(&Io<f32>, Range<usize>),
     pub f64: fn(&Io<f64>, Range<usize>),
+    pub shader: Shader,
 }
 
-impl CpuKernel {
+impl Code {
     pub fn of<K: Kernel>() -> Self {
-        Self { f32: run::<K, f32>, f64: run::<K, f64> }
+        Self { f32: run::<K, f32>, f64: run::<K, f64>, shader: K::SHADER }
     }
 }
 

@@ -101,6 +101,8 @@ fn compaction_power<L: Lane>(p: &[L; PARAMETERS], i_comp: L) -> (L, L) {
 }
 
 impl Material for Charmetant {
+    const SHADER: &'static str = "materials/charmetant";
+
     #[inline(always)]
     fn stress<L: Lane>(p: &[L; PARAMETERS], h: &Tensor<L>) -> Tensor<L> {
         let (zero, one, two) = (L::new(0.0), L::new(1.0), L::new(2.0));

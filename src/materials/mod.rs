@@ -15,6 +15,9 @@ pub const PARAMETERS: usize = 8;
 /// A hyperelastic law in the frame of the fibre (axis 1), from the displacement gradient H = F − I: forming strains from
 /// H loses nothing to cancellation at small strain.
 pub trait Material: 'static {
+    /// Its WGSL twin under `shaders/`.
+    const SHADER: &'static str;
+
     /// First Piola–Kirchhoff stress, MPa.
     fn stress<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> Tensor<L>;
     /// Strain energy per reference volume, MPa, by mode (elongation, compaction, distortion, longitudinal shear).

@@ -27,6 +27,8 @@ pub fn longitudinal(young: f64, poisson: f64) -> f64 {
 const CRUSHED: f64 = 1e-3;
 
 impl Material for NeoHookean {
+    const SHADER: &'static str = "materials/neo_hookean";
+
     #[inline(always)]
     fn stress<L: Lane>(p: &[L; PARAMETERS], h: &Tensor<L>) -> Tensor<L> {
         let one = L::new(1.0);

@@ -19,7 +19,7 @@ use crate::elements::{beam2, bend, hex8};
 use crate::error::{Error, Result};
 use crate::kernel::buffer::{Buffer, Description, Initial, Kind};
 use crate::kernel::position::quanta;
-use crate::kernel::stage::{Access, CpuKernel, Kernel, Plan, Stage};
+use crate::kernel::stage::{Access, Code, Kernel, Plan, Stage};
 use crate::materials::charmetant::Charmetant;
 use crate::materials::neo_hookean::NeoHookean;
 use crate::materials::{Law, Material};
@@ -156,7 +156,8 @@ fn beside<K: Kernel>(
         reads: reads.to_vec(),
         writes: writes.to_vec(),
         params: bytemuck::bytes_of(&params).to_vec(),
-        kernel: CpuKernel::of::<K>(),
+        constants: Vec::new(),
+        kernel: Code::of::<K>(),
         waits: false,
     }
 }
@@ -383,7 +384,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     }
 
     // motion
-    let params = integrate::Params { first_thread, unused: 0, gravity };
+    let params = integrate::Params { first_thread, gravity };
     let reads = [acceleration, mass, correction, inverse_mass];
     let writes = [(velocity, own(3, 1)), (quanta_, own(3, 1)), (remainder, own(3, 1)), (work, own(3, 1))];
     let lines = effects.fibre_lines.is_some();

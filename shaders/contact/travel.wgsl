@@ -1,0 +1,67 @@
+// How far nodes have moved since the last search, how fast they are, and whether they are still numbers.
+
+#include "kernel/stage"
+#include "kernel/position"
+#if travel
+#define STATUS
+#endif
+#include "contact/mod"
+
+#if ROOT
+@group(1) @binding(0) var<storage, read> quanta: array<i32>;
+@group(1) @binding(1) var<storage, read> remainder: array<f32>;
+
+#if remember
+@group(1) @binding(2) var<storage, read_write> search_quanta: array<i32>;
+@group(1) @binding(3) var<storage, read_write> search_remainder: array<f32>;
+
+@compute @workgroup_size(WORKGROUP)
+fn remember(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let node = invocation(workgroup, workgroups, local);
+    if node >= items.count {
+        return;
+    }
+    let plane = arrayLength(&remainder) / 3u;
+    for (var k = 0u; k < 3u; k++) {
+        search_quanta[node + k * plane] = quanta[node + k * plane];
+        search_remainder[node + k * plane] = remainder[node + k * plane];
+    }
+}
+#endif
+
+#if travel
+@group(1) @binding(2) var<storage, read> search_quanta: array<i32>;
+@group(1) @binding(3) var<storage, read> search_remainder: array<f32>;
+@group(1) @binding(4) var<storage, read> velocity: array<f32>;
+@group(1) @binding(5) var<storage, read_write> status: array<atomic<u32>>;
+
+@compute @workgroup_size(WORKGROUP)
+fn travel(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let node = invocation(workgroup, workgroups, local);
+    if node >= items.count {
+        return;
+    }
+    let plane = arrayLength(&remainder) / 3u;
+    var square = 0.0;
+    for (var k = 0u; k < 3u; k++) {
+        let i = node + k * plane;
+        let d = difference(quanta[i], remainder[i], search_quanta[i], search_remainder[i]);
+        square = square + d * d;
+    }
+    if !is_finite(square) {
+        atomicOr(&status[FLAGS], NOT_FINITE);
+    }
+    let v = vec3<f32>(velocity[node], velocity[node + plane], velocity[node + 2u * plane]);
+    raise(TRAVEL, sqrt(square));
+    raise(SPEED, sqrt(dot(v, v)));
+}
+#endif
+#endif

@@ -1,0 +1,165 @@
+//! The WGSL twin of a kernel, and its text: files under `shaders/` put together for one stage.
+//!
+//! A twin has the path and the function names of its Rust file and repeats the same statements for one item. Its text
+//! starts with the constants of the stage; lines that begin with `#` direct the composition:
+//!
+//! - `#include "kernel/math"` puts a file there, the first time it is asked for; `#include LAW` the file of the law
+//!   of the stage,
+//! - `#if NAME`, `#else`, `#endif` keep lines only if the name is defined, so that an effect that a scene does not have leaves
+//!   no text and no binding. Defined are the names that the kernel gives, that of its entry point, `ROOT` in the file of the
+//!   kernel itself (its bindings and entry points are not for the files that include it), and what `#define NAME` added.
+//!
+//! Every line of the text knows the file and the line it comes from. Group 0 holds the row of the step, group 1 the buffers of
+//! the stage at the numbers of the kernel's constants (reads, then writes), group 2 the range of items and the parameters of
+//! the stage.
+
+use super::stage::Stage;
+use crate::error::{Error, Result};
+use include_dir::{Dir, include_dir};
+use std::fmt::Write as _;
+
+static SHADERS: Dir = include_dir!("$CARGO_MANIFEST_DIR/shaders");
+
+/// Invocations of a workgroup.
+pub const WORKGROUP: usize = 64;
+
+/// Where the twin of a kernel is and how it is built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shader {
+    /// File under `shaders/`, without its suffix.
+    pub file: &'static str,
+    /// Name of the entry point.
+    pub entry: &'static str,
+    /// Names that `#if` finds defined.
+    pub defines: &'static [&'static str],
+    /// What `#include LAW` stands for.
+    pub law: Option<&'static str>,
+    /// Invocations that work on one item.
+    pub invocations: usize,
+}
+
+impl Shader {
+    /// One invocation an item, nothing defined.
+    pub const fn new(file: &'static str, entry: &'static str) -> Self {
+        Self { file, entry, defines: &[], law: None, invocations: 1 }
+    }
+}
+
+/// The text of a stage's shader, and where its lines come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Text {
+    pub text: String,
+    /// File and line of every line.
+    pub lines: Vec<(&'static str, usize)>,
+}
+
+/// The files on their way into a text.
+struct Composer {
+    shader: Shader,
+    text: Text,
+    included: Vec<&'static str>,
+    defined: Vec<&'static str>,
+}
+
+impl Text {
+    /// The text of a stage.
+    ///
+    /// # Errors
+    /// A file that is not there, or a directive that makes no sense, by file and line.
+    pub fn of(stage: &Stage) -> Result<Self> {
+        let shader = stage.kernel.shader;
+        let mut composer = Composer {
+            shader,
+            text: Self { text: String::new(), lines: Vec::new() },
+            included: Vec::new(),
+            defined: [&[shader.entry], shader.defines].concat(),
+        };
+        for (name, value) in [("WORKGROUP", WORKGROUP)].iter().chain(&stage.constants) {
+            composer.push(&format!("const {name}: u32 = {value}u;"), ("constants of the stage", 0));
+        }
+        composer.include(shader.file)?;
+        Ok(composer.text)
+    }
+
+    /// The module, parsed and validated.
+    ///
+    /// # Errors
+    /// What is wrong, by file and line of the source.
+    pub fn module(&self) -> Result<(naga::Module, naga::valid::ModuleInfo)> {
+        let module = naga::front::wgsl::parse_str(&self.text).map_err(|error| {
+            let line = error.location(&self.text).map(|at| at.line_number as usize);
+            self.error(error.message(), line)
+        })?;
+        let mut validator =
+            naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+        let info = validator.validate(&module).map_err(|error| {
+            let line = error.location(&self.text).map(|at| at.line_number as usize);
+            let mut causes = vec![error.as_inner().to_string()];
+            let mut cause: Option<&dyn std::error::Error> = std::error::Error::source(error.as_inner());
+            while let Some(inner) = cause {
+                causes.push(inner.to_string());
+                cause = inner.source();
+            }
+            self.error(&causes.join(": "), line)
+        })?;
+        Ok((module, info))
+    }
+
+    fn error(&self, what: &str, line: Option<usize>) -> Error {
+        match line.and_then(|line| self.lines.get(line.wrapping_sub(1))) {
+            Some((file, number)) => Error::Shader(format!("shaders/{file}.wgsl:{number}: {what}")),
+            None => Error::Shader(what.to_owned()),
+        }
+    }
+}
+
+impl Composer {
+    fn push(&mut self, line: &str, from: (&'static str, usize)) {
+        // writing to a String does not fail
+        let _ = writeln!(self.text.text, "{line}");
+        self.text.lines.push(from);
+    }
+
+    fn include(&mut self, path: &'static str) -> Result<()> {
+        if self.included.contains(&path) {
+            return Ok(());
+        }
+        self.included.push(path);
+        let file = SHADERS.get_file(format!("{path}.wgsl")).and_then(|f| f.contents_utf8());
+        let file = file.ok_or_else(|| Error::Shader(format!("there is no shaders/{path}.wgsl")))?;
+        // whether the lines of each open #if are kept
+        let mut kept: Vec<bool> = Vec::new();
+        for (number, line) in file.lines().enumerate() {
+            let number = number + 1;
+            let wrong = |what: &str| Error::Shader(format!("shaders/{path}.wgsl:{number}: {what}"));
+            let keep = kept.iter().all(|keep| *keep);
+            let Some(directive) = line.trim_start().strip_prefix('#') else {
+                if keep {
+                    self.push(line, (path, number));
+                }
+                continue;
+            };
+            let (word, rest) = directive.trim_end().split_once(' ').unwrap_or((directive.trim_end(), ""));
+            match word {
+                "if" if rest == "ROOT" => kept.push(path == self.shader.file),
+                "if" => kept.push(self.defined.contains(&rest)),
+                "else" => {
+                    let last = kept.last_mut().ok_or_else(|| wrong("#else without #if"))?;
+                    *last = !*last;
+                }
+                "endif" => {
+                    kept.pop().ok_or_else(|| wrong("#endif without #if"))?;
+                }
+                "define" if keep => self.defined.push(rest),
+                "include" if keep && rest == "LAW" => {
+                    let law = self.shader.law.ok_or_else(|| wrong("the stage has no law"))?;
+                    self.include(law)?;
+                }
+                "include" if keep => self.include(rest.trim_matches('"'))?,
+                "include" | "define" => {}
+                other => return Err(wrong(&format!("#{other} is no directive"))),
+            }
+        }
+        if kept.is_empty() { Ok(()) } else { Err(Error::Shader(format!("shaders/{path}.wgsl: #if without #endif"))) }
+    }
+}
