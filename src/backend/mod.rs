@@ -1,6 +1,7 @@
 //! Backends run stages on buffers. They know no physics.
 
 pub mod cpu;
+pub mod gpu;
 
 use crate::kernel::buffer::Buffer;
 use crate::kernel::row::Row;
