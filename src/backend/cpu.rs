@@ -142,11 +142,10 @@ impl<R: Precision> Backend for Cpu<R> {
                 spent: spent.expect("every stage has a timer"),
             });
             let number = group.stages.len() - 1;
-            group.chunks.extend(
-                (0..stage.count)
-                    .step_by(stage.grain)
-                    .map(|first| Chunk { stage: number, items: first..(first + stage.grain).min(stage.count) }),
-            );
+            group.chunks.extend((stage.first..stage.first + stage.count).step_by(stage.grain).map(|first| Chunk {
+                stage: number,
+                items: first..(first + stage.grain).min(stage.first + stage.count),
+            }));
         }
         match &self.pool {
             Some(pool) => pool.install(|| Self::run_groups(&groups, &rows, true)),
