@@ -16,7 +16,7 @@ use crate::case::steps::Precision;
 use crate::contact::status;
 use crate::dynamics::time_step;
 use crate::elements::hex8::LANES;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::kernel::buffer::Buffer;
 use crate::kernel::lane::Isa;
 use crate::kernel::row::Row;
@@ -192,6 +192,14 @@ impl Simulation {
     pub fn backend(&self) -> &dyn Backend {
         &*self.backend
     }
+    /// Whether the backend still computes.
+    ///
+    /// # Errors
+    /// What made it fail: numbers read from it since then are void.
+    pub fn alive(&self) -> Result<()> {
+        let at = |fault| format!("{fault}; noticed at step {} (t = {:.6e} s)", self.step, self.time);
+        self.backend.fault().map_or(Ok(()), |fault| Err(Error::Device(at(fault))))
+    }
     /// Whether the schedule has come to its end.
     pub fn done(&self) -> bool {
         self.time >= self.schedule.end() * (1.0 - 1e-12)
@@ -200,7 +208,7 @@ impl Simulation {
     /// Goes on until `until` (s), or until `stop` says so after a burst. The last step ends at or just behind `until`.
     ///
     /// # Errors
-    /// A guard that was provoked.
+    /// A guard that was provoked, or a device that failed.
     pub fn advance(&mut self, until: f64, mut stop: impl FnMut(&Self) -> bool) -> Result<()> {
         if !self.ready {
             self.begin()?;
@@ -214,6 +222,7 @@ impl Simulation {
                     break;
                 }
             }
+            self.alive()?;
             let work = self.collect_stress(self.step - steps, from, self.time - self.dt);
             self.energies.external += work;
             self.look()?;
@@ -256,6 +265,7 @@ impl Simulation {
         self.step += steps;
         self.backend.run(&self.model.plan.watch, &rows[..1]);
         let status = self.backend.uints(self.model.buffers.status);
+        self.alive()?;
         self.check_flags(&status)?;
         self.speed = f64::from(f32::from_bits(status[status::SPEED]));
         let travel = f64::from(f32::from_bits(status[status::TRAVEL]));
@@ -274,14 +284,14 @@ impl Simulation {
             return Ok(());
         }
         // what an overflowing search drops depends on the order in which cells were filled: it must leave no trace
-        let b = &self.model.buffers;
-        let state = [b.contact_keys, b.contact_state, b.pair_keys, b.pair_state];
-        let mut known: Vec<(Buffer, Vec<u8>)> =
-            state.into_iter().flatten().map(|buffer| (buffer, self.backend.bytes(buffer))).collect();
         for _ in 0..8 {
+            let b = &self.model.buffers;
+            let known = [b.contact_keys, b.contact_state, b.pair_keys, b.pair_state];
+            self.backend.save(&known.into_iter().flatten().collect::<Vec<_>>());
             let row = self.schedule.row(self.time, self.dt, self.dt_before);
             self.backend.run(&self.model.plan.search, &[row]);
             let status = self.backend.uints(self.model.buffers.status);
+            self.alive()?;
             let full = status[status::FLAGS] & (status::CELL_FULL | status::SLOTS_FULL);
             self.clear_travel(&status);
             if full == 0 {
@@ -298,13 +308,8 @@ impl Simulation {
                 capacity.slots = (capacity.slots * 2).min(16);
                 capacity.beam_slots *= 2;
             }
-            for (buffer, bytes) in &known {
-                self.backend.set_bytes(*buffer, bytes);
-            }
+            self.backend.restore();
             self.grow(capacity)?;
-            for (buffer, bytes) in &mut known {
-                *bytes = self.backend.bytes(*buffer);
-            }
         }
         Err(self.guard(
             "contact overflow",
@@ -330,6 +335,7 @@ impl Simulation {
             };
             backend.set_bytes(Buffer(new), &bytes);
         }
+        self.alive()?;
         self.model = model;
         self.backend = backend;
         self.capacity = capacity;

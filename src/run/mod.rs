@@ -242,7 +242,9 @@ impl<'a> Run<'a> {
                 }
             }
             if !matches!(step, Step::Shear { .. } | Step::Move { .. }) && self.yarns.is_some() {
-                let yarns = yarns::measure(&self.simulation.mesh, &self.simulation.frame())?;
+                let frame = self.simulation.frame();
+                self.simulation.alive()?;
+                let yarns = yarns::measure(&self.simulation.mesh, &frame)?;
                 self.settled = Some(yarns::ply(&yarns, Ply::Warp));
                 self.settled_weft = Some(yarns::ply(&yarns, Ply::Weft));
             }
@@ -298,6 +300,7 @@ impl<'a> Run<'a> {
         let reaction = libm::sqrt(reaction.iter().map(|f| f * f).sum());
         let (e, h) = (*s.energies(), *s.health());
         let motion = s.load().motion;
+        s.alive()?;
         self.worst_balance = self.worst_balance.max(h.balance.abs());
         self.dt_range = [self.dt_range[0].min(s.dt()), self.dt_range[1].max(s.dt())];
         for (largest, now) in self.largest_added.iter_mut().zip(h.added_mass) {
@@ -334,7 +337,9 @@ impl<'a> Run<'a> {
         let numbers: Vec<f64> = [&[time, degrees][..], &counts, &h.penetration, &h.added_mass, &[h.dt_limit]].concat();
         self.contacts.numbers(&numbers)?;
         if let Some([table, each]) = &mut self.yarns {
-            let yarns = yarns::measure(&s.mesh, &s.frame())?;
+            let frame = s.frame();
+            s.alive()?;
+            let yarns = yarns::measure(&s.mesh, &frame)?;
             let plies = [Ply::Warp, Ply::Weft].map(|ply| yarns::ply(&yarns, ply));
             let means = plies.map(|p| [p.width.mean, p.thickness.mean, p.gap.mean]);
             let spreads = plies.map(|p| [p.width.std, p.thickness.std, p.gap.std]);
@@ -357,7 +362,9 @@ impl<'a> Run<'a> {
             }
         }
         if let Some(table) = &mut self.stitches {
-            let t = stitches::measure(&s.mesh, &s.tensions())?;
+            let tensions = s.tensions();
+            s.alive()?;
+            let t = stitches::measure(&s.mesh, &tensions)?;
             table.numbers(&[
                 time,
                 degrees,
@@ -378,6 +385,7 @@ impl<'a> Run<'a> {
     fn write_frame(&mut self, name: &str) -> Result<()> {
         let s = &self.simulation;
         let frame = s.frame();
+        s.alive()?;
         let dir = &self.options.output;
         let file = format!("frames/{:04}-{name}.vtu", self.frames.len());
         vtu::write(&s.mesh, &frame, &dir.join(&file))?;
