@@ -11,6 +11,7 @@ pub use ledger::Energies;
 
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
+use crate::backend::gpu::{Device, Gpu};
 use crate::case::Case;
 use crate::case::steps::Precision;
 use crate::contact::status;
@@ -23,6 +24,7 @@ use crate::kernel::row::Row;
 use crate::mesh::Mesh;
 use crate::plan::{self, Capacity, Model};
 use crate::schedule::{Load, Schedule};
+use std::sync::Arc;
 
 /// Steps between two looks at the distance travelled.
 const BURST: u64 = 8;
@@ -90,26 +92,36 @@ pub struct Simulation {
 }
 
 /// How to make a backend.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Make {
     pub precision: Precision,
-    /// 0 for all cores.
+    /// Threads of the CPU; 0 for all cores.
     pub threads: usize,
     pub isa: Isa,
+    /// The device that runs the scene; `None` for the CPU.
+    pub device: Option<Arc<Device>>,
 }
 
 impl Default for Make {
     fn default() -> Self {
-        Self { precision: Precision::F32, threads: 0, isa: Isa::best() }
+        Self { precision: Precision::F32, threads: 0, isa: Isa::best(), device: None }
     }
 }
 
 impl Make {
-    fn backend(&self, model: &Model) -> Box<dyn Backend> {
-        match self.precision {
-            Precision::F32 => Box::new(Cpu::<f32>::new(&model.plan.buffers, self.threads, self.isa)),
-            Precision::F64 => Box::new(Cpu::<f64>::new(&model.plan.buffers, self.threads, self.isa)),
-        }
+    /// # Errors
+    /// A scene that the device cannot hold or compute.
+    fn backend(&self, model: &Model) -> Result<Box<dyn Backend>> {
+        let buffers = &model.plan.buffers;
+        Ok(match (&self.device, self.precision) {
+            (None, Precision::F32) => Box::new(Cpu::<f32>::new(buffers, self.threads, self.isa)),
+            (None, Precision::F64) => Box::new(Cpu::<f64>::new(buffers, self.threads, self.isa)),
+            (Some(device), Precision::F32) => Box::new(Gpu::new(Arc::clone(device), buffers)?),
+            (Some(_), Precision::F64) => {
+                let what = "a GPU computes in f32 only; set integration.precision to f32, or use --backend cpu";
+                return Err(Error::Unsupported(what.into()));
+            }
+        })
     }
 }
 
@@ -135,7 +147,7 @@ impl Simulation {
     /// Geometry that cannot be run.
     pub fn with_capacity(case: &Case, friction: f64, mesh: Mesh, make: Make, capacity: Capacity) -> Result<Self> {
         let model = plan::build(case, friction, &mesh, capacity)?;
-        let backend = make.backend(&model);
+        let backend = make.backend(&model)?;
         let slip = vec![0.0; model.slaves.len()];
         let schedule = Schedule::new(&case.steps, &case.effects);
         Ok(Self {
@@ -321,7 +333,7 @@ impl Simulation {
     /// Moves the state into a plan with larger contact tables.
     fn grow(&mut self, capacity: Capacity) -> Result<()> {
         let model = plan::build(&self.case, self.friction, &self.mesh, capacity)?;
-        let mut backend = self.make.backend(&model);
+        let mut backend = self.make.backend(&model)?;
         for (old, description) in self.model.plan.buffers.iter().enumerate() {
             let new = model.plan.buffers.iter().position(|d| d.name == description.name);
             let Some(new) = new.filter(|_| !matches!(description.name, "items of cells" | "cells" | "status")) else {

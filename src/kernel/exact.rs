@@ -22,7 +22,7 @@ pub struct Exact;
 
 /// Where item `i` starts, quanta, and what it adds in each step, mm: from a thousandth of a quantum to a hundred.
 pub fn start(item: usize) -> (i32, f64) {
-    let sign = if item % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = if item.is_multiple_of(2) { 1.0 } else { -1.0 };
     (quanta(item as f64 * 0.37 - 150.0), sign * QUANTUM * libm::pow(10.0, (item % 97) as f64 * 5.0 / 96.0 - 3.0))
 }
 

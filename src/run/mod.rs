@@ -1,14 +1,17 @@
 //! Case in, results out: owns the plan, the backend, the schedule, the measures and the outputs of one run.
 
 mod check;
+mod devices;
 mod mesh;
 mod picture;
 mod summary;
 
 pub use check::check;
+pub use devices::devices;
 pub use mesh::mesh;
 pub use picture::picture;
 
+use crate::backend::gpu::{self, Device};
 use crate::case::Case;
 use crate::case::domain::Domain;
 use crate::case::read::Loaded;
@@ -40,10 +43,34 @@ pub struct Options {
     pub precision: Option<Precision>,
     /// Number of threads; `None` for all cores.
     pub threads: Option<usize>,
+    /// What the scene runs on.
+    pub machine: Machine,
+    /// Part of the name of the adapter; empty for any.
+    pub adapter: String,
     /// Move earlier results in the folder aside.
     pub force: bool,
     /// No progress.
     pub quiet: bool,
+}
+
+/// What a scene runs on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Machine {
+    /// A discrete GPU if there is one and the scene is in f32, else the CPU.
+    Auto,
+    Cpu,
+    Gpu,
+}
+
+/// The machine that was asked for, ready to make backends.
+fn make(precision: Precision, options: &Options) -> Result<Make> {
+    let wanted = match options.machine {
+        Machine::Cpu => false,
+        Machine::Gpu => true,
+        Machine::Auto => precision == Precision::F32 && gpu::devices().first().is_some_and(|d| d.is_discrete),
+    };
+    let device = if wanted { Some(Device::open(&options.adapter)?) } else { None };
+    Ok(Make { precision, threads: options.threads.unwrap_or(0), device, ..Make::default() })
 }
 
 /// What a run found, in ten lines.
@@ -92,9 +119,7 @@ pub fn run(loaded: &Loaded, options: &Options) -> Result<Outcome> {
     if let Some(precision) = options.precision {
         loaded.case.integration.precision = precision;
     }
-    let make =
-        Make { precision: loaded.case.integration.precision, threads: options.threads.unwrap_or(0), ..Make::default() };
-    let simulation = simulation(&loaded, make)?;
+    let simulation = simulation(&loaded, make(loaded.case.integration.precision, options)?)?;
     directory::prepare(&options.output, options.force)?;
     write_case(&loaded.case, &options.output)?;
     let stopped = Arc::new(AtomicBool::new(false));

@@ -19,8 +19,10 @@ pub struct Listed {
     /// Graphics interface: Vulkan, Metal or Dx12.
     pub interface: String,
     pub driver: String,
-    /// A GPU, or software that stands in for one.
-    pub is_hardware: bool,
+    /// Discrete GPU, integrated GPU, virtual GPU, or software.
+    pub kind: &'static str,
+    /// A GPU with memory of its own.
+    pub is_discrete: bool,
     /// Largest buffer that a stage can bind, bytes.
     pub binding_bytes: u64,
     /// Largest buffer, bytes.
@@ -77,7 +79,14 @@ fn list(adapter: &wgpu::Adapter) -> Listed {
         name: info.name,
         interface: info.backend.to_string(),
         driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
-        is_hardware: info.device_type != wgpu::DeviceType::Cpu,
+        kind: match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+            wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+            wgpu::DeviceType::VirtualGpu => "virtual GPU",
+            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::Other => "other",
+        },
+        is_discrete: info.device_type == wgpu::DeviceType::DiscreteGpu,
         binding_bytes: limits.max_storage_buffer_binding_size,
         buffer_bytes: limits.max_buffer_size,
         storage_buffers: limits.max_storage_buffers_per_shader_stage,

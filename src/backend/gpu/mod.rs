@@ -339,6 +339,33 @@ impl Backend for Gpu {
         self.device.queue.write_buffer(&self.buffers[buffer.0], 0, bytes);
     }
 
+    fn save(&mut self, buffers: &[Buffer]) {
+        if !self.saved.iter().map(|(b, _)| b).eq(buffers) {
+            let copy = |buffer: &Buffer| {
+                let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+                let (label, size) = (Some("saved"), self.buffers[buffer.0].size());
+                let descriptor = wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false };
+                (*buffer, self.device.device.create_buffer(&descriptor))
+            };
+            self.saved = buffers.iter().map(copy).collect();
+        }
+        let mut work = self.work.borrow_mut();
+        for (buffer, copy) in &self.saved {
+            work.encoder.copy_buffer_to_buffer(&self.buffers[buffer.0], 0, copy, 0, None);
+        }
+    }
+
+    fn restore(&mut self) {
+        let mut work = self.work.borrow_mut();
+        for (buffer, copy) in &self.saved {
+            work.encoder.copy_buffer_to_buffer(copy, 0, &self.buffers[buffer.0], 0, None);
+        }
+    }
+
+    fn fault(&self) -> Option<String> {
+        self.device.fault()
+    }
+
     fn timings(&self) -> Vec<(&'static str, f64)> {
         self.read_clock();
         let work = self.work.borrow();
