@@ -126,7 +126,7 @@ impl Composer {
         }
         self.included.push(path);
         let file = SHADERS.get_file(format!("{path}.wgsl")).and_then(|f| f.contents_utf8());
-        let file = file.ok_or_else(|| Error::Shader(format!("there is no shaders/{path}.wgsl")))?;
+        let file = file.ok_or_else(|| Error::Shader(format!("shaders/{path}.wgsl: there is no such file")))?;
         // whether the lines of each open #if are kept
         let mut kept: Vec<bool> = Vec::new();
         for (number, line) in file.lines().enumerate() {

@@ -8,8 +8,10 @@
 
 mod device;
 mod pipeline;
+mod rates;
 
 pub use device::{Device, Listed, devices};
+pub use rates::Rates;
 
 use super::Backend;
 use super::cpu::Cpu;
