@@ -1,0 +1,80 @@
+// Axial part of a 2-node beam. What includes this binds `ends`, `beams`, `quanta` and `remainder`.
+
+#if force
+#include "kernel/stage"
+#endif
+#include "kernel/row"
+#include "kernel/node"
+
+// Numbers of a beam in the table.
+const TABLE: u32 = 6u;
+
+// A beam's reference vector and its change, mm.
+struct Beam {
+    reference: vec3<f32>,
+    change: vec3<f32>,
+}
+
+fn vector(beam: u32) -> Beam {
+    let at = TABLE * beam;
+    let reference = vec3<f32>(beams[at], beams[at + 1u], beams[at + 2u]);
+    let fluctuation = displacement_between(ends[2u * beam + 1u], ends[2u * beam]);
+    let g = gradient();
+    let stretched = vec3<f32>(dot(g[0], reference), dot(g[1], reference), dot(g[2], reference));
+    return Beam(reference, stretched + fluctuation);
+}
+
+#if PERIODIC
+// Adds `force ⊗ reference` to the nine numbers of an item.
+fn add_virial(item: u32, force: vec3<f32>, reference: vec3<f32>) {
+    for (var i = 0u; i < 3u; i++) {
+        for (var j = 0u; j < 3u; j++) {
+            let at = 9u * item + 3u * i + j;
+            virial[at] = virial[at] + force[i] * reference[j];
+        }
+    }
+}
+#endif
+
+#if ROOT
+@group(1) @binding(0) var<storage, read> ends: array<u32>;
+@group(1) @binding(1) var<storage, read> beams: array<f32>;
+@group(1) @binding(2) var<storage, read> quanta: array<i32>;
+@group(1) @binding(3) var<storage, read> remainder: array<f32>;
+@group(1) @binding(4) var<storage, read_write> forces: array<f32>;
+@group(1) @binding(5) var<storage, read_write> tensions: array<f32>;
+@group(1) @binding(6) var<storage, read_write> work: array<f32>;
+#if PERIODIC
+@group(1) @binding(7) var<storage, read_write> virial: array<f32>;
+#endif
+
+@compute @workgroup_size(WORKGROUP)
+fn force(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let number = invocation(workgroup, workgroups, local);
+    if number >= items.count {
+        return;
+    }
+    let beam = items.first + number;
+    let b = vector(beam);
+    let rest = beams[TABLE * beam + 3u];
+    let axial = beams[TABLE * beam + 4u];
+    let thermal = beams[TABLE * beam + 5u];
+    let current = b.reference + b.change;
+    let length = sqrt(dot(current, current));
+    let strain = (2.0 * dot(b.reference, b.change) + dot(b.change, b.change)) / (rest * (length + rest));
+    let tension = axial * (strain - thermal * row.thermal);
+    let along = current * (tension / length);
+    forces[3u * beam] = along.x;
+    forces[3u * beam + 1u] = along.y;
+    forces[3u * beam + 2u] = along.z;
+    tensions[beam] = tension;
+    work[beam] = work[beam] - tension * rest * thermal * row.thermal_increment;
+#if PERIODIC
+    add_virial(beam, along, b.reference);
+#endif
+}
+#endif
