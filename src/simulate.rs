@@ -14,6 +14,7 @@ use crate::backend::cpu::Cpu;
 use crate::case::Case;
 use crate::case::steps::Precision;
 use crate::contact::status;
+use crate::contact::threads::MOST_PAIRS;
 use crate::dynamics::time_step;
 use crate::elements::hex8::LANES;
 use crate::error::Result;
@@ -296,7 +297,7 @@ impl Simulation {
             }
             if full & status::SLOTS_FULL != 0 {
                 capacity.slots = (capacity.slots * 2).min(16);
-                capacity.beam_slots *= 2;
+                capacity.beam_slots = (capacity.beam_slots * 2).min(MOST_PAIRS);
             }
             for (buffer, bytes) in &known {
                 self.backend.set_bytes(*buffer, bytes);
