@@ -24,7 +24,7 @@ static SHADERS: Dir = include_dir!("$CARGO_MANIFEST_DIR/shaders");
 pub const WORKGROUP: usize = 64;
 
 /// Where the twin of a kernel is and how it is built.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Shader {
     /// File under `shaders/`, without its suffix.
     pub file: &'static str,
