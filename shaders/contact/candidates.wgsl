@@ -71,11 +71,7 @@ fn across(slave: u32, body: u32, image: vec2<i32>, ring: i32, slice: i32) -> Edg
     );
 }
 
-fn length_of(v: vec3<f32>) -> f32 {
-    return sqrt(dot(v, v));
-}
-
-// The best faces of a slab: of `faces` faces from `first` around the ring.
+// The best faces of a slab, whose first one is at `first` around the ring.
 fn best_of(slave: u32, body: u32, image: vec2<i32>, slice: i32, first: i32, is_thread: bool, reach: f32) -> Best {
     let nowhere = Near(FAR, Place(0, 0));
     var best = Best(key(body, image), nowhere, nowhere);
@@ -85,8 +81,8 @@ fn best_of(slave: u32, body: u32, image: vec2<i32>, slice: i32, first: i32, is_t
         let corners = array<vec3<f32>, 4>(here.low, here.high, next.high, next.low);
         here = next;
         let middle = ((corners[0] + corners[1]) + (corners[2] + corners[3])) * 0.25;
-        let spread = 0.5 * max(length_of(corners[2] - corners[0]), length_of(corners[3] - corners[1]));
-        if length_of(middle) > reach + spread * 1.1 {
+        let spread = 0.5 * max(norm(corners[2] - corners[0]), norm(corners[3] - corners[1]));
+        if norm(middle) > reach + spread * 1.1 {
             continue;
         }
         let point = closest(corners);
@@ -94,7 +90,7 @@ fn best_of(slave: u32, body: u32, image: vec2<i32>, slice: i32, first: i32, is_t
             continue;
         }
         let face = Near(point.distance, Place(ring, slice));
-        if height_of(point) >= 0.0 || is_thread && !point.interior {
+        if height(point) >= 0.0 || is_thread && !point.interior {
             best.in_front = nearer(best.in_front, face);
         } else if normal_and_distance(point, is_thread).faces {
             best.behind = nearer(best.behind, face);
@@ -113,7 +109,7 @@ fn candidates(
     if item >= items.count {
         return;
     }
-    let back = inverse_gradient();
+    let back = inverse();
     let stretched = stretch(back);
     let slave = slaves[SLAVE * item];
     let own = slaves[SLAVE * item + 1u];

@@ -102,7 +102,7 @@ fn node(body: u32, image: vec2<i32>, place: Place) -> Imaged {
 }
 
 // The corners of a face.
-fn face_corners(slave: u32, body: u32, image: vec2<i32>, place: Place) -> Corners {
+fn corners(slave: u32, body: u32, image: vec2<i32>, place: Place) -> Corners {
     let n0 = node(body, image, place);
     let n1 = node(body, image, Place(place.ring, place.slice + 1));
     let n2 = node(body, image, Place(place.ring + 1, place.slice + 1));
@@ -189,12 +189,12 @@ fn closest(q: array<vec3<f32>, 4>) -> Closest {
     }
     let offset = -at(p, x.x, x.y);
     let n = cross(p[3] * x.x + p[2], p[3] * x.y + p[1]);
-    let normal = n * (1.0 / max(sqrt(dot(n, n)), 1e-20));
-    return Closest(x.x, x.y, offset, sqrt(dot(offset, offset)), normal, interior);
+    let normal = n * (1.0 / max(norm(n), 1e-20));
+    return Closest(x.x, x.y, offset, norm(offset), normal, interior);
 }
 
 // Height of the slave above the face's tangent plane, mm.
-fn height_of(point: Closest) -> f32 {
+fn height(point: Closest) -> f32 {
     return dot(point.offset, point.normal);
 }
 
@@ -202,7 +202,7 @@ fn height_of(point: Closest) -> f32 {
 fn better_than(point: Closest, other: Closest) -> bool {
     let tie = other.distance * 1e-4 + 1e-7;
     if abs(point.distance - other.distance) < tie {
-        return height_of(point) > height_of(other) + tie;
+        return height(point) > height(other) + tie;
     }
     return point.distance < other.distance;
 }
@@ -216,7 +216,7 @@ struct Side {
 }
 
 fn normal_and_distance(point: Closest, is_thread: bool) -> Side {
-    let height = height_of(point);
+    let height = height(point);
     if point.interior || point.distance < 1e-6 {
         return Side(true, point.normal, height);
     }
@@ -227,7 +227,7 @@ fn normal_and_distance(point: Closest, is_thread: bool) -> Side {
 }
 
 // Weights of the four corners.
-fn corner_weights(point: Closest) -> vec4<f32> {
+fn weights(point: Closest) -> vec4<f32> {
     let a = 1.0 - point.xi;
     let b = 1.0 + point.xi;
     let c = 1.0 - point.eta;
@@ -247,7 +247,7 @@ const RING_REACH: i32 = 3;
 fn walk(slave: u32, body: u32, image: vec2<i32>, from_place: Place) -> Walked {
     var here: Walked;
     here.place = from_place;
-    here.corners = face_corners(slave, body, image, from_place);
+    here.corners = corners(slave, body, image, from_place);
     here.point = closest(here.corners.current);
     for (var i = 0u; i < MOST_FACES; i++) {
         if here.point.interior {
@@ -270,7 +270,7 @@ fn walk(slave: u32, body: u32, image: vec2<i32>, from_place: Place) -> Walked {
                     continue;
                 }
             }
-            let next_corners = face_corners(slave, body, image, next);
+            let next_corners = corners(slave, body, image, next);
             let next_point = closest(next_corners.current);
             if better_than(next_point, here.point) {
                 here = Walked(next, next_corners, next_point);
@@ -337,7 +337,7 @@ fn add_near(
     if *count == MOST_TOUCHED {
         return false;
     }
-    let corners = face_corners(slave, body, image, place);
+    let corners = corners(slave, body, image, place);
     let point = closest(corners.current);
     let is_near = point.distance < reach;
     if is_near {

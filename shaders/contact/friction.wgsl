@@ -1,5 +1,7 @@
 // Coulomb friction with true stick.
 
+#include "kernel/vector"
+
 // What one step of sliding leaves.
 struct Slide {
     elastic: vec3<f32>,
@@ -17,7 +19,7 @@ fn flat_part(normal: vec3<f32>, a: vec3<f32>) -> vec3<f32> {
 fn slide(elastic: vec3<f32>, motion: vec3<f32>, normal: vec3<f32>, tangential: f32, limit: f32) -> Slide {
     let turned = flat_part(normal, elastic);
     let trial = turned + flat_part(normal, motion);
-    let size = sqrt(dot(trial, trial));
+    let size = norm(trial);
     let held = size * tangential;
     let half_stiffness = 0.5 * tangential;
     var new_elastic = trial;
@@ -27,5 +29,5 @@ fn slide(elastic: vec3<f32>, motion: vec3<f32>, normal: vec3<f32>, tangential: f
     let gone = trial - new_elastic;
     // work over the step with the mean of the force before and after, less what is stored
     let lost = (dot(elastic, elastic) - dot(turned, turned)) + dot(turned + new_elastic, gone);
-    return Slide(new_elastic, sqrt(dot(gone, gone)), half_stiffness * lost);
+    return Slide(new_elastic, norm(gone), half_stiffness * lost);
 }

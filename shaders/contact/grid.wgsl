@@ -43,7 +43,7 @@ struct Inverse {
     y: vec2<f32>,
 }
 
-fn inverse_gradient() -> Inverse {
+fn inverse() -> Inverse {
     let a = 1.0 + row.gradient_xx;
     let b = row.gradient_xy;
     let c = row.gradient_yx;
@@ -124,7 +124,7 @@ fn fill(
     if item >= items.count {
         return;
     }
-    let back = inverse_gradient();
+    let back = inverse();
     var origin: u32;
     var reach: f32;
     var bounds = Bounds(vec3<f32>(0.0), vec3<f32>(0.0));

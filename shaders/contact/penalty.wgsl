@@ -56,7 +56,7 @@ fn add_sum(item: u32, sum: u32, value: f32) {
 }
 
 // Subtracts force ⊗ ΔX from the sum of an item that makes the homogenised stress.
-fn subtract_virial(item: u32, push: vec3<f32>, apart: vec3<f32>) {
+fn add_virial(item: u32, push: vec3<f32>, apart: vec3<f32>) {
     for (var i = 0u; i < 3u; i++) {
         for (var j = 0u; j < 3u; j++) {
             add_sum(item, SUM_VIRIAL + 3u * i + j, -(push[i] * apart[j]));
@@ -116,7 +116,7 @@ fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
     if depth <= 0.0 || -side.distance >= params.depth {
         return;
     }
-    let weights = corner_weights(point);
+    let weights = weights(point);
     var motion = velocity_at(slave);
     var apart = vec3<f32>(0.0);
     var inverse_mass = 1.0 / mass[slave];
@@ -138,7 +138,7 @@ fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
     let push = side.normal * pressed.pressing;
     (*all).push = (*all).push + push;
     (*all).normal_force = (*all).normal_force + pressed.pressing;
-    subtract_virial(item, push, apart);
+    add_virial(item, push, apart);
     let masters = Weighted(4u, corners.nodes, weights);
     add_pair(push, single(slave), masters);
     add_stiffness(pressed.row_sum, masters);
@@ -205,11 +205,11 @@ fn penalty(
         if all.is_thread && point.distance < all.radius {
             faces_within(&all, slave, candidate.body, candidate.image, found, all.radius);
         }
-        let size = sqrt(dot(all.push, all.push));
+        let size = norm(all.push);
         if !(all.touched && size > 0.0) {
             add_sum(item, SUM_FRICTION, 0.5 * tangential * dot(elastic, elastic));
             // a point behind a face keeps being looked at
-            let gap = select(0.0, point.distance - all.radius, all.is_thread || height_of(point) > 0.0);
+            let gap = select(0.0, point.distance - all.radius, all.is_thread || height(point) > 0.0);
             states[s] = 0.0;
             states[s + 1u] = 0.0;
             states[s + 2u] = 0.0;
@@ -227,7 +227,7 @@ fn penalty(
         states[s + 3u] = all.normal_force;
         all.energy = all.energy + 0.5 * tangential * dot(slid.elastic, slid.elastic);
         let drag = slid.elastic * -tangential;
-        subtract_virial(item, drag, all.apart);
+        add_virial(item, drag, all.apart);
         add_pair(drag, single(slave), all.masters);
     }
     sums[SUMS * item + SUM_ENERGY] = all.energy;

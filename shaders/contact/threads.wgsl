@@ -96,7 +96,7 @@ fn pairs(
     if beam >= items.count {
         return;
     }
-    let back = inverse_gradient();
+    let back = inverse();
     let period = vec2<f32>(params.period) * QUANTUM;
     let reach = 2.0 * params.thread_radius + params.skin;
     let at_box = BOX * (params.slabs + beam);
@@ -138,7 +138,7 @@ fn pairs(
                 let direction = theirs.reference + theirs.change;
                 let st = closest_points(along, direction, apart);
                 let offset = along * st.x - (direction * st.y + apart);
-                if !(sqrt(dot(offset, offset)) < reach) {
+                if !(norm(offset) < reach) {
                     continue;
                 }
                 let pair = key(other, image);
@@ -243,7 +243,7 @@ fn force(
         let direction = theirs.reference + theirs.change;
         let st = closest_points(along, direction, apart.current);
         let offset = along * st.x - (direction * st.y + apart.current);
-        let distance = sqrt(dot(offset, offset));
+        let distance = norm(offset);
         let depth = radius + radius - distance;
         let s = STATE * (slots * beam + slot);
         let elastic = vec3<f32>(states[s], states[s + 1u], states[s + 2u]);
@@ -286,7 +286,7 @@ fn force(
         states[s + 3u] = pressed.pressing;
         energy = energy + 0.5 * (pressed.elastic_force * depth + tangential * dot(slid.elastic, slid.elastic));
         let push = normal * pressed.pressing - slid.elastic * tangential;
-        subtract_virial(beam, push, rest);
+        add_virial(beam, push, rest);
         add_pair(push, nodes, others);
         add_stiffness(pressed.row_sum, nodes);
         add_stiffness(pressed.row_sum, others);
