@@ -15,6 +15,7 @@ use crate::backend::gpu::{Device, Gpu};
 use crate::case::Case;
 use crate::case::steps::Precision;
 use crate::contact::status;
+use crate::contact::threads::MOST_PAIRS;
 use crate::dynamics::time_step;
 use crate::elements::hex8::LANES;
 use crate::error::{Error, Result};
@@ -318,7 +319,7 @@ impl Simulation {
             }
             if full & status::SLOTS_FULL != 0 {
                 capacity.slots = (capacity.slots * 2).min(16);
-                capacity.beam_slots *= 2;
+                capacity.beam_slots = (capacity.beam_slots * 2).min(MOST_PAIRS);
             }
             self.backend.restore();
             self.grow(capacity)?;
