@@ -1,8 +1,6 @@
 // Axial part of a 2-node beam. What includes this binds `ends`, `beams`, `quanta` and `remainder`.
 
-#if force
 #include "kernel/stage"
-#endif
 #include "kernel/row"
 #include "kernel/node"
 
@@ -25,14 +23,17 @@ fn vector(beam: u32) -> Beam {
 }
 
 #if PERIODIC
-// Adds `force ⊗ reference` to the nine numbers of an item.
+// Adds `force ⊗ reference` to the nine numbers of an item in the buffer bound as `virial`.
 fn add_virial(item: u32, force: vec3<f32>, reference: vec3<f32>) {
-    for (var i = 0u; i < 3u; i++) {
-        for (var j = 0u; j < 3u; j++) {
-            let at = 9u * item + 3u * i + j;
-            virial[at] = virial[at] + force[i] * reference[j];
-        }
-    }
+    add_row(9u * item, force.x * reference);
+    add_row(9u * item + 3u, force.y * reference);
+    add_row(9u * item + 6u, force.z * reference);
+}
+
+fn add_row(at: u32, row: vec3<f32>) {
+    virial[at] = virial[at] + row.x;
+    virial[at + 1u] = virial[at + 1u] + row.y;
+    virial[at + 2u] = virial[at + 2u] + row.z;
 }
 #endif
 

@@ -1,0 +1,66 @@
+// Bending between two consecutive beams, without rotational unknowns.
+
+#include "elements/beam2"
+
+// Numbers of a bend in the table.
+const BEND: u32 = 2u;
+// Largest smoothing of tan(θ/2).
+const SMOOTHING: f32 = 0.005;
+
+#if ROOT
+@group(1) @binding(0) var<storage, read> pairs: array<u32>;
+@group(1) @binding(1) var<storage, read> bends: array<f32>;
+@group(1) @binding(2) var<storage, read> ends: array<u32>;
+@group(1) @binding(3) var<storage, read> beams: array<f32>;
+@group(1) @binding(4) var<storage, read> quanta: array<i32>;
+@group(1) @binding(5) var<storage, read> remainder: array<f32>;
+@group(1) @binding(6) var<storage, read_write> forces: array<f32>;
+@group(1) @binding(7) var<storage, read_write> energies: array<f32>;
+#if PERIODIC
+@group(1) @binding(8) var<storage, read_write> virial: array<f32>;
+#endif
+
+@compute @workgroup_size(WORKGROUP)
+fn force(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let number = invocation(workgroup, workgroups, local);
+    if number >= items.count {
+        return;
+    }
+    let bend = items.first + number;
+    let stiffness = bends[BEND * bend];
+    let rest = bends[BEND * bend + 1u];
+    let first = vector(pairs[2u * bend]);
+    let second = vector(pairs[2u * bend + 1u]);
+    let current0 = first.reference + first.change;
+    let current1 = second.reference + second.change;
+    let inverse0 = 1.0 / sqrt(dot(current0, current0));
+    let inverse1 = 1.0 / sqrt(dot(current1, current1));
+    let tangent0 = current0 * inverse0;
+    let tangent1 = current1 * inverse1;
+    let cosine = dot(tangent0, tangent1);
+    // a thread folded onto itself: tan(θ/2) ends at 10
+    let opening = max(1.0 + cosine, 0.02);
+    let turned = cross(tangent0, tangent1);
+    let smoothing = min(SMOOTHING, 0.5 * rest);
+    let t = max(sqrt(dot(turned, turned) / (opening * opening) + smoothing * smoothing), 1e-12);
+    let slope = -2.0 * stiffness * (1.0 - rest / t) / (opening * opening);
+    let g0 = (tangent1 - tangent0 * cosine) * (slope * inverse0);
+    let g1 = (tangent0 - tangent1 * cosine) * (slope * inverse1);
+    let at = 6u * bend;
+    forces[at] = g0.x;
+    forces[at + 1u] = g0.y;
+    forces[at + 2u] = g0.z;
+    forces[at + 3u] = g1.x;
+    forces[at + 4u] = g1.y;
+    forces[at + 5u] = g1.z;
+    energies[bend] = stiffness * (t - rest) * (t - rest);
+#if PERIODIC
+    add_virial(bend, g0, first.reference);
+    add_virial(bend, g1, second.reference);
+#endif
+}
+#endif

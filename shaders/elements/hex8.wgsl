@@ -1,0 +1,362 @@
+// Fully integrated 8-node hexahedron: one invocation works on one lane of a block.
+
+// Hexahedra in a block.
+const LANES: u32 = 16u;
+
+#if ROOT
+#include "kernel/stage"
+#include "kernel/row"
+#include "kernel/position"
+#include LAW
+
+// Numbers of a shape, and of a block in the buffers that are written.
+const SHAPE: u32 = 80u * LANES;
+const SLOTS: u32 = 24u * LANES;
+const VIRIAL: u32 = 9u * LANES;
+const ENERGY: u32 = 5u * LANES;
+const BOUND: u32 = 8u * LANES;
+
+// One-dimensional shape function at its own and at the opposite Gauss point.
+const NEAR: f32 = 0.7886751345948129;
+const FAR: f32 = 0.21132486540518713;
+
+struct Params {
+    // Nodes in a plane of the position buffers.
+    nodes: u32,
+}
+
+@group(2) @binding(1) var<uniform> params: Params;
+
+@group(1) @binding(0) var<storage, read> headers: array<u32>;
+@group(1) @binding(1) var<storage, read> corners: array<u32>;
+@group(1) @binding(2) var<storage, read> quanta: array<i32>;
+@group(1) @binding(3) var<storage, read> remainder: array<f32>;
+@group(1) @binding(4) var<storage, read> shapes: array<f32>;
+@group(1) @binding(5) var<storage, read> frames: array<f32>;
+@group(1) @binding(6) var<storage, read> materials: array<f32>;
+@group(1) @binding(7) var<storage, read_write> out: array<f32>;
+#if PERIODIC
+@group(1) @binding(8) var<storage, read_write> out_virial: array<f32>;
+#endif
+
+// A hexahedron: where its numbers start in the tables.
+struct Hex {
+    corners: u32,
+    shape: u32,
+    frame: u32,
+    material: u32,
+}
+
+// Derivatives with respect to ξ, η and ζ, each at the four points of the other two directions.
+struct Derivatives {
+    x: array<vec3<f32>, 4>,
+    y: array<vec3<f32>, 4>,
+    z: array<vec3<f32>, 4>,
+}
+
+fn hex(block: u32, lane: u32) -> Hex {
+    let header = 4u * block;
+    return Hex(
+        8u * LANES * block + lane,
+        SHAPE * headers[header + 2u] + lane,
+        9u * headers[header + 1u],
+        PARAMETERS * headers[header],
+    );
+}
+
+// Row k of the inverse Jacobian at a Gauss point, halved.
+fn inverse(h: Hex, point: u32, k: u32) -> vec3<f32> {
+    let at = h.shape + (10u * point + 3u * k) * LANES;
+    return vec3<f32>(shapes[at], shapes[at + LANES], shapes[at + 2u * LANES]);
+}
+
+fn volume(h: Hex, point: u32) -> f32 {
+    return shapes[h.shape + (10u * point + 9u) * LANES];
+}
+
+fn frame(h: Hex) -> Tensor {
+    let q = h.frame;
+    return Tensor(
+        vec3<f32>(frames[q], frames[q + 1u], frames[q + 2u]),
+        vec3<f32>(frames[q + 3u], frames[q + 4u], frames[q + 5u]),
+        vec3<f32>(frames[q + 6u], frames[q + 7u], frames[q + 8u]),
+    );
+}
+
+fn material(h: Hex) -> array<f32, PARAMETERS> {
+    let p = h.material;
+    return array<f32, PARAMETERS>(
+        materials[p],
+        materials[p + 1u],
+        materials[p + 2u],
+        materials[p + 3u],
+        materials[p + 4u],
+        materials[p + 5u],
+        materials[p + 6u],
+        materials[p + 7u],
+    );
+}
+
+fn node_quanta(node: u32) -> vec3<i32> {
+    return vec3<i32>(quanta[node], quanta[node + params.nodes], quanta[node + 2u * params.nodes]);
+}
+
+fn node_remainder(node: u32) -> vec3<f32> {
+    return vec3<f32>(remainder[node], remainder[node + params.nodes], remainder[node + 2u * params.nodes]);
+}
+
+// Displacement of a corner (in mesh order) from a position, in the fibre's frame.
+fn displacement(h: Hex, corner: u32, from_quanta: vec3<i32>, from_remainder: vec3<f32>, q: Tensor) -> vec3<f32> {
+    let node = corners[h.corners + corner * LANES];
+    let global = vec3<f32>(node_quanta(node) - from_quanta) * QUANTUM + (node_remainder(node) - from_remainder);
+    return fma(q[2], global.zzz, fma(q[1], global.yyy, q[0] * global.x));
+}
+
+// Derivatives of the displacement in the fibre's frame.
+fn derivatives(h: Hex, q: Tensor) -> Derivatives {
+    let node = corners[h.corners];
+    let at = node_quanta(node);
+    let rest = node_remainder(node);
+    // binary order; the first corner does not move against itself
+    let u1 = displacement(h, 1u, at, rest, q);
+    let u2 = displacement(h, 3u, at, rest, q);
+    let u3 = displacement(h, 2u, at, rest, q);
+    let u4 = displacement(h, 4u, at, rest, q);
+    let u5 = displacement(h, 5u, at, rest, q);
+    let u6 = displacement(h, 7u, at, rest, q);
+    let u7 = displacement(h, 6u, at, rest, q);
+    return Derivatives(
+        interpolate(u1, u3 - u2, u5 - u4, u7 - u6),
+        interpolate(u2, u3 - u1, u6 - u4, u7 - u5),
+        interpolate(u4, u5 - u1, u6 - u2, u7 - u3),
+    );
+}
+
+fn near_far(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
+    return fma(vec3<f32>(NEAR), a, FAR * b);
+}
+
+fn far_near(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
+    return fma(vec3<f32>(FAR), a, NEAR * b);
+}
+
+// Differences along one direction, interpolated to the Gauss points of the others.
+fn interpolate(d0: vec3<f32>, d1: vec3<f32>, d2: vec3<f32>, d3: vec3<f32>) -> array<vec3<f32>, 4> {
+    let f0 = near_far(d0, d1);
+    let f1 = far_near(d0, d1);
+    let f2 = near_far(d2, d3);
+    let f3 = far_near(d2, d3);
+    return array<vec3<f32>, 4>(near_far(f0, f2), near_far(f1, f3), far_near(f0, f2), far_near(f1, f3));
+}
+
+// The transpose of `interpolate`.
+fn spread(g: array<vec3<f32>, 4>) -> array<vec3<f32>, 4> {
+    let f0 = near_far(g[0], g[2]);
+    let f1 = near_far(g[1], g[3]);
+    let f2 = far_near(g[0], g[2]);
+    let f3 = far_near(g[1], g[3]);
+    return array<vec3<f32>, 4>(near_far(f0, f1), far_near(f0, f1), near_far(f2, f3), far_near(f2, f3));
+}
+
+// For each direction, which of the four points of the other two directions a Gauss point is.
+fn others(point: u32) -> vec3<u32> {
+    let i = point & 1u;
+    let j = (point >> 1u) & 1u;
+    let k = point >> 2u;
+    return vec3<u32>(j + 2u * k, i + 2u * k, i + 2u * j);
+}
+
+// The macroscopic gradient in the fibre's frame, Qᵀ A Q.
+fn macroscopic(q: Tensor) -> Tensor {
+    let g = gradient();
+    return (q * Tensor(g[0], g[1], g[2])) * transpose(q);
+}
+
+// H at a Gauss point.
+fn gradient_at(h: Hex, point: u32, d: ptr<function, Derivatives>, add: Tensor) -> Tensor {
+    let at = others(point);
+    let x = (*d).x[at.x];
+    let y = (*d).y[at.y];
+    let z = (*d).z[at.z];
+    let a = inverse(h, point, 0u);
+    let b = inverse(h, point, 1u);
+    let c = inverse(h, point, 2u);
+    return Tensor(
+        fma(z.xxx, c, fma(y.xxx, b, x.x * a)) + add[0],
+        fma(z.yyy, c, fma(y.yyy, b, x.y * a)) + add[1],
+        fma(z.zzz, c, fma(y.zzz, b, x.z * a)) + add[2],
+    );
+}
+
+#if force
+// What the Gauss points of a hexahedron add up to: forces conjugate to derivatives, and for periodic scenes V P̄.
+struct Sum {
+    forces: Derivatives,
+    stress: Tensor,
+}
+
+fn add_point(h: Hex, point: u32, p: array<f32, PARAMETERS>, d: ptr<function, Derivatives>, add: Tensor, sum: ptr<function, Sum>) {
+    let weighted = stress(p, gradient_at(h, point, d, add)) * volume(h, point);
+#if PERIODIC
+    (*sum).stress = (*sum).stress + weighted;
+#endif
+    let at = others(point);
+    (*sum).forces.x[at.x] = (*sum).forces.x[at.x] - inverse(h, point, 0u) * weighted;
+    (*sum).forces.y[at.y] = (*sum).forces.y[at.y] - inverse(h, point, 1u) * weighted;
+    (*sum).forces.z[at.z] = (*sum).forces.z[at.z] - inverse(h, point, 2u) * weighted;
+}
+
+// Writes three components, a lane apart.
+fn store(at: u32, a: vec3<f32>) {
+    out[at] = a.x;
+    out[at + LANES] = a.y;
+    out[at + 2u * LANES] = a.z;
+}
+
+#if PERIODIC
+fn add_virial(at: u32, a: vec3<f32>) {
+    out_virial[at] = out_virial[at] + a.x;
+    out_virial[at + LANES] = out_virial[at + LANES] + a.y;
+    out_virial[at + 2u * LANES] = out_virial[at + 2u * LANES] + a.z;
+}
+#endif
+
+@compute @workgroup_size(WORKGROUP)
+fn force(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let number = invocation(workgroup, workgroups, local);
+    if number >= items.count * LANES {
+        return;
+    }
+    let block = items.first + number / LANES;
+    let lane = number % LANES;
+    let h = hex(block, lane);
+    let q = frame(h);
+    let p = material(h);
+    let add = macroscopic(q);
+    var d = derivatives(h, q);
+    var sum = Sum();
+    add_point(h, 0u, p, &d, add, &sum);
+    add_point(h, 1u, p, &d, add, &sum);
+    add_point(h, 2u, p, &d, add, &sum);
+    add_point(h, 3u, p, &d, add, &sum);
+    add_point(h, 4u, p, &d, add, &sum);
+    add_point(h, 5u, p, &d, add, &sum);
+    add_point(h, 6u, p, &d, add, &sum);
+    add_point(h, 7u, p, &d, add, &sum);
+    let x = spread(sum.forces.x);
+    let y = spread(sum.forces.y);
+    let z = spread(sum.forces.z);
+    // corners in mesh order
+    let at = SLOTS * block + lane;
+    store(at, (-x[0] - y[0] - z[0]) * q);
+    store(at + 3u * LANES, (x[0] - y[1] - z[1]) * q);
+    store(at + 6u * LANES, (x[1] + y[1] - z[3]) * q);
+    store(at + 9u * LANES, (y[0] - x[1] - z[2]) * q);
+    store(at + 12u * LANES, (z[0] - x[2] - y[2]) * q);
+    store(at + 15u * LANES, (x[2] - y[3] + z[1]) * q);
+    store(at + 18u * LANES, (x[3] + y[3] + z[3]) * q);
+    store(at + 21u * LANES, (y[2] - x[3] + z[2]) * q);
+#if PERIODIC
+    // Q A Qᵀ
+    let turned = (transpose(q) * sum.stress) * q;
+    let start = VIRIAL * block + lane;
+    add_virial(start, turned[0]);
+    add_virial(start + 3u * LANES, turned[1]);
+    add_virial(start + 6u * LANES, turned[2]);
+#endif
+}
+#endif
+
+#if energy
+@compute @workgroup_size(WORKGROUP)
+fn energy(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let number = invocation(workgroup, workgroups, local);
+    if number >= items.count * LANES {
+        return;
+    }
+    let block = items.first + number / LANES;
+    let lane = number % LANES;
+    let h = hex(block, lane);
+    let q = frame(h);
+    let p = material(h);
+    let add = macroscopic(q);
+    var d = derivatives(h, q);
+    var sum = vec4<f32>();
+    var smallest = 1e30;
+    for (var point = 0u; point < 8u; point++) {
+        let here = gradient_at(h, point, &d, add);
+        sum = fma(energies(p, here), vec4<f32>(volume(h, point)), sum);
+        smallest = min(smallest, jacobian(here));
+    }
+    let at = ENERGY * block + lane;
+    out[at] = sum.x;
+    out[at + LANES] = sum.y;
+    out[at + 2u * LANES] = sum.z;
+    out[at + 3u * LANES] = sum.w;
+    out[at + 4u * LANES] = smallest;
+}
+#endif
+
+#if bound
+// Size of the derivatives of the shape function of a binary corner across the fibre, at a Gauss point.
+fn slope_across(h: Hex, point: u32, corner: u32) -> f32 {
+    let bits = vec3<u32>(0u, 1u, 2u);
+    let high = (vec3<u32>(corner) >> bits) & vec3<u32>(1u);
+    let own = high == ((vec3<u32>(point) >> bits) & vec3<u32>(1u));
+    let n = select(vec3<f32>(FAR), vec3<f32>(NEAR), own);
+    let sign = select(vec3<f32>(-1.0), vec3<f32>(1.0), high == vec3<u32>(1u));
+    let slope = sign * n.yxx * n.zzy;
+    let across = fma(slope.zzz, inverse(h, point, 2u), fma(slope.yyy, inverse(h, point, 1u), slope.x * inverse(h, point, 0u)));
+    return sqrt(across.y * across.y + across.z * across.z);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn bound(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let number = invocation(workgroup, workgroups, local);
+    if number >= items.count * LANES {
+        return;
+    }
+    let block = items.first + number / LANES;
+    let lane = number % LANES;
+    let h = hex(block, lane);
+    let q = frame(h);
+    let p = material(h);
+    let add = macroscopic(q);
+    var d = derivatives(h, q);
+    var rows = array<f32, 8>();
+    for (var point = 0u; point < 8u; point++) {
+        var sizes = array<f32, 8>();
+        var total = 0.0;
+        for (var a = 0u; a < 8u; a++) {
+            sizes[a] = slope_across(h, point, a);
+            total = total + sizes[a];
+        }
+        let k = stiffness(p, gradient_at(h, point, &d, add)) * volume(h, point) * total;
+        for (var a = 0u; a < 8u; a++) {
+            rows[a] = fma(k, sizes[a], rows[a]);
+        }
+    }
+    let at = BOUND * block + lane;
+    out[at] = rows[0];
+    out[at + LANES] = rows[1];
+    out[at + 2u * LANES] = rows[3];
+    out[at + 3u * LANES] = rows[2];
+    out[at + 4u * LANES] = rows[4];
+    out[at + 5u * LANES] = rows[5];
+    out[at + 6u * LANES] = rows[7];
+    out[at + 7u * LANES] = rows[6];
+}
+#endif
+#endif
