@@ -1,7 +1,7 @@
 //! A scene in time: drives a backend through the schedule, keeps the energy ledger, and stops what goes wrong. It writes no files.
 //!
 //! Steps run in bursts. After each burst the distance travelled decides on a contact search; after each window of bursts
-//! the sums that kernels keep per item are added up in f64, energies and the limit of the time step are taken, and guards look.
+//! the sums that kernels keep per item are added up there, and only totals come to the host: energies and the limit of the time step are taken, and guards look.
 
 mod guards;
 mod ledger;
@@ -17,7 +17,6 @@ use crate::case::steps::Precision;
 use crate::contact::status;
 use crate::contact::threads::MOST_PAIRS;
 use crate::dynamics::time_step;
-use crate::elements::hex8::LANES;
 use crate::error::{Error, Result};
 use crate::kernel::buffer::Buffer;
 use crate::kernel::lane::Isa;
@@ -88,7 +87,6 @@ pub struct Simulation {
     largest_flow: f64,
     health: Health,
     stress: StressMean,
-    slip: Vec<f64>,
     ready: bool,
 }
 
@@ -149,7 +147,6 @@ impl Simulation {
     pub fn with_capacity(case: &Case, friction: f64, mesh: Mesh, make: Make, capacity: Capacity) -> Result<Self> {
         let model = plan::build(case, friction, &mesh, capacity)?;
         let backend = make.backend(&model)?;
-        let slip = vec![0.0; model.slaves.len()];
         let schedule = Schedule::new(&case.steps, &case.effects);
         Ok(Self {
             gradient_at_search: schedule.load(0.0),
@@ -171,7 +168,6 @@ impl Simulation {
             largest_flow: 0.0,
             health: Health::default(),
             stress: StressMean::default(),
-            slip,
             ready: false,
             mesh,
             model,
@@ -235,10 +231,7 @@ impl Simulation {
                     break;
                 }
             }
-            self.alive()?;
-            let work = self.collect_stress(self.step - steps, from, self.time - self.dt);
-            self.energies.external += work;
-            self.look()?;
+            self.look(self.step - steps, from, self.time - self.dt)?;
             if stop(self) {
                 break;
             }
@@ -252,11 +245,11 @@ impl Simulation {
         self.dt = self.case.integration.dt_s.unwrap_or(self.case.integration.dt_max_s);
         self.dt_before = self.dt;
         self.search()?;
-        self.diagnose();
+        let totals = self.diagnose()?;
         self.choose_dt();
         self.dt_before = self.dt;
-        self.energies = self.state_energies();
-        self.energies.contact = self.contact_at_rest();
+        self.set_state(&totals);
+        self.energies.contact = self.contact_at_rest()?;
         self.start_energy = self.energies.output();
         Ok(())
     }
@@ -344,7 +337,7 @@ impl Simulation {
             let bytes = if model.plan.buffers[new].len == description.len {
                 bytes
             } else {
-                widen(&bytes, description.len, &backend.bytes(Buffer(new)), &model, description.name)
+                widen(&bytes, description.len, &backend.bytes(Buffer(new)), &model, self.mesh.beams(), description.name)
             };
             backend.set_bytes(Buffer(new), &bytes);
         }
@@ -366,24 +359,13 @@ impl Simulation {
         self.backend.set_bytes(self.model.buffers.status, &bytes);
     }
 
-    /// Energies, limits and guards after a window of steps.
-    fn look(&mut self) -> Result<()> {
-        self.collect_work();
-        self.diagnose();
-        let state = self.state_energies();
-        self.energies = Energies {
-            contact: self.energies.contact,
-            friction: self.energies.friction,
-            contact_damping: self.energies.contact_damping,
-            damping: self.energies.damping,
-            thermal: self.energies.thermal,
-            radius: self.energies.radius,
-            external: self.energies.external,
-            prescribed: self.energies.prescribed,
-            gravity: self.energies.gravity,
-            inertia: self.energies.inertia,
-            ..state
-        };
+    /// Energies, limits and guards after a window of `steps` from time `from` to `to`.
+    fn look(&mut self, steps: u64, from: f64, to: f64) -> Result<()> {
+        let totals = self.diagnose()?;
+        self.add_work(&totals);
+        self.add_contact(&totals);
+        self.add_stress(&totals, steps, from, to);
+        self.set_state(&totals);
         let e = &self.energies;
         let flow = [e.thermal, e.radius, e.external, e.prescribed, e.gravity].iter().map(|w| w.abs()).sum::<f64>();
         self.largest_flow = self.largest_flow.max(flow + self.start_energy.abs()).max(e.output());
@@ -394,50 +376,37 @@ impl Simulation {
         Ok(())
     }
 
-    /// Runs the stages for energies and limits, and reads them.
-    fn diagnose(&mut self) {
+    /// Runs the stages for energies and limits; returns the totals.
+    fn diagnose(&mut self) -> Result<Vec<f64>> {
         let row = self.schedule.row(self.time, self.dt, self.dt_before);
         self.backend.run(&self.model.plan.diagnose, &[row]);
-        let nodes = self.mesh.nodes.len();
-        let limits = self.backend.scalars(self.model.buffers.element_limit);
-        let (node, worst) = limits[nodes..]
-            .iter()
-            .enumerate()
-            .fold((0, 0.0), |best, (node, k)| if *k > best.1 { (node, *k) } else { best });
+        self.backend.run(&self.model.plan.collect, &[row]);
+        let places = &self.model.totals;
+        let totals = self.backend.scalars(places.buffer);
         let status = self.backend.uints(self.model.buffers.status);
+        self.alive()?;
+        let (worst, node) = places.stiffness.of(&totals);
         let contact = f64::from(f32::from_bits(status[status::CONTACT_RATE]));
         self.health.dt_limit = time_step::limit(worst + contact) * self.model.line_factor;
         self.health.limiting_node = node;
-        (self.health.min_jacobian, self.health.worst_hex) = self.worst_jacobian();
+        (self.health.min_jacobian, self.health.worst_hex) = places.jacobian.map_or((1.0, 0), |largest| {
+            let (negative, place) = largest.of(&totals);
+            (-negative, self.model.hex_at[place])
+        });
         self.health.penetration = status::PENETRATION.map(|p| f64::from(f32::from_bits(status[p])));
         let steps = (self.step - self.diagnosed).max(1) as u32;
         self.diagnosed = self.step;
         self.health.touching = status::TOUCHING.map(|p| status[p] / steps);
+        let first = self.model.first_thread;
+        let (solids, threads) = self.model.true_mass.split_at(first);
+        self.health.added_mass = [(places.added[0], solids), (places.added[1], threads)]
+            .map(|(added, mass)| added.map_or(0.0, |added| added.of(&totals, 0) / mass.iter().sum::<f64>()));
         let mut cleared = status;
         for place in [status::CONTACT_RATE].into_iter().chain(status::PENETRATION).chain(status::TOUCHING) {
             cleared[place] = 0;
         }
         self.backend.set_bytes(self.model.buffers.status, bytemuck::cast_slice(&cleared));
-        if let Some(added) = self.model.buffers.added_mass {
-            let added = self.backend.scalars(added);
-            let first = self.model.first_thread;
-            let share = |range: std::ops::Range<usize>| {
-                let mass: f64 = self.model.true_mass[range.clone()].iter().sum();
-                if mass > 0.0 { added[range].iter().sum::<f64>() / mass } else { 0.0 }
-            };
-            self.health.added_mass = [share(0..first), share(first..nodes)];
-        }
-    }
-
-    fn worst_jacobian(&self) -> (f64, usize) {
-        let Some(energy) = self.model.buffers.hex_energy else { return (1.0, 0) };
-        let values = self.backend.scalars(energy);
-        self.model
-            .hex_place
-            .iter()
-            .enumerate()
-            .map(|(hex, (block, lane))| (values[(block * 5 + 4) * LANES + lane], hex))
-            .fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a })
+        Ok(totals)
     }
 
     fn choose_dt(&mut self) {
@@ -454,10 +423,10 @@ impl Simulation {
 }
 
 /// Slots of an old table in the first places of wider rows of a new one.
-fn widen(old: &[u8], old_len: usize, fresh: &[u8], model: &Model, name: &str) -> Vec<u8> {
+fn widen(old: &[u8], old_len: usize, fresh: &[u8], model: &Model, beams: usize, name: &str) -> Vec<u8> {
     let mut new = fresh.to_vec();
     let new_len = model.plan.buffers.iter().find(|d| d.name == name).map_or(0, |d| d.len);
-    let items = if name.starts_with("beam pair") { model.beams.len() } else { model.slaves.len() };
+    let items = if name.starts_with("beam pair") { beams } else { model.slaves.len() };
     if items == 0 || !old_len.is_multiple_of(items) || !new_len.is_multiple_of(items) {
         return new;
     }

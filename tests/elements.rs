@@ -377,3 +377,27 @@ fn fibre_lines_do_not_change_the_static_answer() {
     let stopped = bent_yarn(Value::Null, 2.0 * short, F64).unwrap_err();
     println!("explicit at 1.4e-7 s: {stopped}");
 }
+
+#[test]
+fn blocks_of_two_laws_move_as_if_alone() {
+    let blocks = [
+        block("rubber", [3, 2, 2], [[0.0; 3], [3.0, 2.0, 2.0]], DENSITY, neo_hookean(10.0, 0.3)),
+        block("yarn", [20, 2, 2], [[0.0, 0.0, 5.0], [3.0, 2.0, 7.0]], DENSITY, charmetant()),
+    ];
+    let after = |blocks: &[Value], speed: &[[f64; 3]]| {
+        let mut simulation = start(&scene(json!(blocks)), F32);
+        simulation.set_velocities(speed);
+        advance(&mut simulation, 5e-8);
+        (simulation.velocities(), simulation.energies().internal())
+    };
+    let mut random = Random(8);
+    let nodes = start(&scene(json!(blocks)), F32).mesh.nodes.len();
+    let speed: Vec<[f64; 3]> = (0..nodes).map(|_| [0; 3].map(|_| 1e4 * random.draw())).collect();
+    let (both, energy) = after(&blocks, &speed);
+    let first = 4 * 3 * 3;
+    let (rubber, rubber_energy) = after(&blocks[..1], &speed[..first]);
+    let (yarn, yarn_energy) = after(&blocks[1..], &speed[first..]);
+    assert_eq!(both, [rubber, yarn].concat());
+    assert!(rubber_energy > 0.0 && yarn_energy > 0.0);
+    near("energy", energy, rubber_energy + yarn_energy, 1e-6);
+}

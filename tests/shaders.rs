@@ -66,7 +66,7 @@ fn stages() -> Vec<(String, Stage, Vec<Description>)> {
     for (scene, case) in scenes() {
         let simulation = simulation(&loaded(&case), Make::default()).unwrap_or_else(|e| panic!("{scene}: {e}"));
         let plan = &simulation.model.plan;
-        for stage in [&plan.step, &plan.search, &plan.watch, &plan.diagnose].into_iter().flatten() {
+        for stage in [&plan.step, &plan.search, &plan.watch, &plan.diagnose, &plan.collect].into_iter().flatten() {
             all.push((format!("{scene}, {}", stage.name), stage.clone(), plan.buffers.clone()));
         }
     }
@@ -102,6 +102,8 @@ fn parameters(file: &str) -> Vec<Field<&'static str>> {
         ),
         "dynamics/fibre_lines" => fields!(dynamics::fibre_lines::Params: beta),
         "dynamics/integrate" => fields!(dynamics::integrate::Params: first_thread, gravity),
+        "dynamics/energy" => fields!(dynamics::energy::Params: count, length, into, centre),
+        "dynamics/totals" => fields!(dynamics::totals::Params: start, count, lanes, stride, columns, length, into),
         "dynamics/time_step" => fields!(dynamics::time_step::Params: first_thread),
         _ => Vec::new(),
     }
@@ -194,6 +196,6 @@ fn every_twin_compiles_and_sees_what_its_stage_binds() {
         failed += usize::from(catch_unwind(|| check(&name, &stage, &buffers)).is_err());
     }
     println!("{seen:#?}");
-    assert!(seen.len() == 17, "{} kinds of stages", seen.len());
+    assert!(seen.len() == 22, "{} kinds of stages", seen.len());
     assert_eq!(failed, 0, "stages without a twin that fits; see above");
 }

@@ -10,6 +10,7 @@ pub mod face;
 pub mod friction;
 pub mod grid;
 pub mod penalty;
+pub mod slip;
 pub mod threads;
 pub mod travel;
 

@@ -37,6 +37,7 @@ const WORK: usize = 7;
 pub const WORK_DAMPING: usize = 0;
 pub const WORK_INERTIA: usize = 1;
 pub const WORK_GRAVITY: usize = 2;
+pub const WORKS: usize = 3;
 
 /// Integration; with `LINES`, the correction of fibre lines is added first, with `GRAVITY` gravity.
 pub struct Integrate<const LINES: bool, const GRAVITY: bool>;

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 pub enum Access {
     /// Item `i` owns `stride` numbers from `i · stride` in each of `planes` equal parts of the buffer.
     Own { planes: usize, stride: usize },
-    /// Items own disjoint numbers that a table of the stage names.
+    /// Items own disjoint numbers that a table or the constants of the stage name.
     Scatter,
     /// Integers that any item may add to; the order does not matter.
     Atomic,
@@ -56,6 +56,8 @@ pub struct Plan {
     pub watch: Vec<Stage>,
     /// Run when energies and limits are wanted.
     pub diagnose: Vec<Stage>,
+    /// Run after that, to add up what the host reads.
+    pub collect: Vec<Stage>,
 }
 
 /// A kernel, written once for every precision and register width.

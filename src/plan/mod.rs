@@ -2,11 +2,12 @@
 //!
 //! A step: forces of hexahedra, beams, bends and contact, side by side; assembly to accelerations; prescribed motion;
 //! fibre lines; integration. When the contact skin is used up: grid, then candidates. For energies and limits: the
-//! diagnose stages. An effect that the scene does not have adds no buffer and no stage.
+//! diagnose stages, then the collect stages, which add up what the host reads. An effect that the scene does not have adds no buffer and no stage.
 
 mod solids;
 mod surfaces;
 mod threads;
+mod totals;
 
 use crate::case::Case;
 use crate::case::domain::Domain;
@@ -28,21 +29,23 @@ use bytemuck::Pod;
 use solids::Solids;
 use surfaces::Surfaces;
 use threads::Threads;
+pub use totals::{Largest, Sums, Totals};
 
 /// A plan, and what the host must know to drive it and to understand what it computes.
 pub struct Model {
     pub plan: Plan,
     pub buffers: Buffers,
+    pub totals: Totals,
     /// True mass of every node, tonne, and mass with the floor.
     pub true_mass: Vec<f64>,
     pub mass: Vec<f64>,
     pub first_thread: usize,
     /// Block and lane of each hexahedron, in the order of the mesh.
     pub hex_place: Vec<(usize, usize)>,
+    /// Hexahedron in each lane of each block.
+    pub hex_at: Vec<usize>,
     /// Reference volume of each hexahedron, mm³.
     pub hex_volume: Vec<f64>,
-    /// Length, mm, and EA, N, of each beam.
-    pub beams: Vec<[f64; 2]>,
     /// Node, area or length, and whether it is a thread's, of each contact slave.
     pub slaves: Vec<Slave>,
     /// Factor on 2/ω of the explicit stiffness that fibre lines leave: √(1 − 1/(4β)).
@@ -74,17 +77,9 @@ pub struct Buffers {
     pub quanta: Buffer,
     pub remainder: Buffer,
     pub velocity: Buffer,
-    pub added_mass: Option<Buffer>,
     pub status: Buffer,
-    pub work: Buffer,
-    pub element_limit: Buffer,
     pub hex_energy: Option<Buffer>,
-    pub hex_virial: Option<Buffer>,
     pub beam_tension: Option<Buffer>,
-    pub beam_work: Option<Buffer>,
-    pub beam_virial: Option<Buffer>,
-    pub bend_energy: Option<Buffer>,
-    pub bend_virial: Option<Buffer>,
     pub contact_force: Option<Buffer>,
     pub contact_stiffness: Option<Buffer>,
     pub contact_sums: Option<Buffer>,
@@ -94,7 +89,8 @@ pub struct Buffers {
     pub pair_keys: Option<Buffer>,
     pub pair_state: Option<Buffer>,
     pub reaction: Option<Buffer>,
-    pub reaction_work: Option<Buffer>,
+    /// Slip of each contact slave since the start, mm.
+    pub slip: Option<Buffer>,
 }
 
 /// Sizes of contact's tables, which grow when they overflow: slots up to 16, those of beams up to [`thread_contact::MOST_PAIRS`].
@@ -207,7 +203,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let status_ = b.add("status", Kind::Uint, status::SIZE, false, Initial::Zero);
     let acceleration = b.scratch("acceleration", 3 * nodes);
     let inverse_mass = b.scratch("inverse mass", nodes);
-    let work = b.scratch("work on nodes", 3 * nodes);
+    let work = b.scratch("work on nodes", integrate::WORKS * nodes);
 
     // forces of elements
     let materials = b.table("materials", solids.materials.clone());
@@ -412,6 +408,39 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let writes = [(element_limit, own(2, 1))];
     b.plan.diagnose.push(after::<time_step::ElementLimit>("element limit", nodes, NODE_GRAIN, &reads, &writes, params));
 
+    let (faces, pairs) = contact.as_ref().map_or((None, None), |c| (c.faces, c.pairs));
+    let sources = totals::Sources {
+        mesh,
+        masses: &floored,
+        hex_place: &solids.place,
+        hex_blocks: hexes,
+        bends,
+        slaves: contact.as_ref().map_or(0, |c| c.slaves.len()),
+        conditions: condition_nodes.map_or(0, |(_, count)| count),
+        mass,
+        velocity,
+        reference,
+        work,
+        element_limit,
+        beam_table,
+        hex_energy,
+        hex_virial,
+        beam_tension,
+        beam_work,
+        beam_virial,
+        bend_energy,
+        bend_virial,
+        contact_sums: faces.map(|f| f.sums),
+        pair_sums: pairs.map(|p| p.sums),
+        reaction_work,
+        added_mass,
+    };
+    let (totals, slip) = totals::add(&mut b, &sources);
+    let mut hex_at = vec![0; hexes * hex8::LANES];
+    for (hex, (block, lane)) in solids.place.iter().enumerate() {
+        hex_at[block * hex8::LANES + lane] = hex;
+    }
+
     let thickness = mesh.blocks.iter().map(|block| thickness(mesh, block)).fold(f64::INFINITY, f64::min);
     let radius = threads.radius.iter().copied().fold(f64::INFINITY, f64::min);
     Ok(Model {
@@ -420,35 +449,28 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             quanta: quanta_,
             remainder,
             velocity,
-            added_mass,
             status: status_,
-            work,
-            element_limit,
             hex_energy,
-            hex_virial,
             beam_tension,
-            beam_work,
-            beam_virial,
-            bend_energy,
-            bend_virial,
             contact_force: contact.as_ref().map(|c| c.force),
             contact_stiffness: contact.as_ref().map(|c| c.stiffness),
-            contact_sums: contact.as_ref().and_then(|c| c.faces.map(|f| f.sums)),
-            contact_keys: contact.as_ref().and_then(|c| c.faces.map(|f| f.keys)),
-            contact_state: contact.as_ref().and_then(|c| c.faces.map(|f| f.state)),
-            pair_sums: contact.as_ref().and_then(|c| c.pairs.map(|f| f.sums)),
-            pair_keys: contact.as_ref().and_then(|c| c.pairs.map(|f| f.keys)),
-            pair_state: contact.as_ref().and_then(|c| c.pairs.map(|f| f.state)),
+            contact_sums: faces.map(|f| f.sums),
+            contact_keys: faces.map(|f| f.keys),
+            contact_state: faces.map(|f| f.state),
+            pair_sums: pairs.map(|p| p.sums),
+            pair_keys: pairs.map(|p| p.keys),
+            pair_state: pairs.map(|p| p.state),
             reaction,
-            reaction_work,
+            slip,
         },
+        totals,
         plan: b.plan,
         true_mass,
         mass: floored,
         first_thread: first,
+        hex_at,
         hex_place: solids.place,
         hex_volume: solids.volume,
-        beams: threads.beams.chunks_exact(beam2::TABLE).map(|row| [row[3], row[4]]).collect(),
         slaves: contact.map_or_else(Vec::new, |c| c.slaves),
         line_factor,
         limits: Limits { thread_radius: radius, yarn_thickness: thickness },

@@ -52,9 +52,13 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
     );
     if explain {
         let plan = &probe.model.plan;
-        for (list, stages) in
-            [("step", &plan.step), ("watch", &plan.watch), ("search", &plan.search), ("diagnose", &plan.diagnose)]
-        {
+        for (list, stages) in [
+            ("step", &plan.step),
+            ("watch", &plan.watch),
+            ("search", &plan.search),
+            ("diagnose", &plan.diagnose),
+            ("collect", &plan.collect),
+        ] {
             let _ = write!(t, "\n{list}");
             for stage in stages {
                 let names = |buffers: Vec<_>| {

@@ -134,6 +134,7 @@ impl Simulation {
         let b = &self.model.buffers;
         let (Some(keys), Some(state)) = (b.contact_keys, b.contact_state) else { return Vec::new() };
         let (keys, state) = (self.backend.uints(keys), self.backend.scalars(state));
+        let slipped = b.slip.map_or_else(Vec::new, |b| self.backend.scalars(b));
         let nodes = self.mesh.nodes.len();
         let (mut force, mut pressure, mut slip) = (vec![0.0; nodes], vec![0.0; nodes], vec![0.0; nodes]);
         let slots = self.capacity.slots;
@@ -144,7 +145,7 @@ impl Simulation {
                 .map(|s| state[s * penalty::SLOT_STATE + 3].max(0.0))
                 .sum();
             force[slave.node] = normal;
-            slip[slave.node] = self.slip[item];
+            slip[slave.node] = slipped[item];
             if !slave.is_thread && slave.measure > 0.0 {
                 pressure[slave.node] = normal / slave.measure;
             }

@@ -1,0 +1,136 @@
+// Totals: columns of numbers added up, and the worst of them, part by part. A workgroup works on a part.
+
+#include "kernel/stage"
+
+var<workgroup> sums: array<f32, WORKGROUP>;
+
+// Adds what the invocations of a workgroup found, the upper half to the lower until one sum is left.
+fn add_up(found: f32, local: u32) -> f32 {
+    sums[local] = found;
+    for (var half = WORKGROUP / 2u; half > 0u; half = half / 2u) {
+        workgroupBarrier();
+        if local < half {
+            sums[local] = sums[local] + sums[local + half];
+        }
+    }
+    return sums[local];
+}
+
+#if ROOT
+struct Params {
+    start: u32,
+    count: u32,
+    lanes: u32,
+    stride: u32,
+    columns: u32,
+    length: u32,
+    into: u32,
+}
+
+@group(2) @binding(1) var<uniform> params: Params;
+
+// Where a number of a column is.
+fn place_of(number: u32, column: u32) -> u32 {
+    return params.start + number / params.lanes * params.stride + column * params.lanes + number % params.lanes;
+}
+
+#if sum
+#if TAKEN
+@group(1) @binding(0) var<storage, read_write> source: array<f32>;
+#else
+@group(1) @binding(0) var<storage, read> source: array<f32>;
+#endif
+@group(1) @binding(1) var<storage, read_write> totals: array<f32>;
+
+@compute @workgroup_size(WORKGROUP)
+fn sum(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let item = workgroup.y * workgroups.x + workgroup.x;
+    if item >= items.count {
+        return;
+    }
+    let column = item % params.columns;
+    let first = item / params.columns * params.length;
+    let end = min(first + params.length, params.count);
+    var found = 0.0;
+    for (var number = first + local; number < end; number += WORKGROUP) {
+        let place = place_of(number, column);
+        found = found + source[place];
+#if TAKEN
+        source[place] = 0.0;
+#endif
+    }
+    let total = add_up(found, local);
+    if local == 0u {
+        totals[params.into + item] = total;
+    }
+}
+#endif
+
+#if worst
+@group(1) @binding(0) var<storage, read> source: array<f32>;
+#if JACOBIAN
+@group(1) @binding(1) var<storage, read> lanes_used: array<u32>;
+@group(1) @binding(2) var<storage, read_write> totals: array<f32>;
+#else
+@group(1) @binding(1) var<storage, read_write> totals: array<f32>;
+#endif
+
+// Hexahedra of a block, and numbers left for a part.
+const LANES: u32 = 16u;
+const WORST: u32 = 2u;
+const LOWEST: f32 = -1e30;
+
+var<workgroup> places: array<u32, WORKGROUP>;
+
+@compute @workgroup_size(WORKGROUP)
+fn worst(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let item = workgroup.y * workgroups.x + workgroup.x;
+    if item >= items.count {
+        return;
+    }
+    let first = item * params.length;
+    let end = min(first + params.length, params.count);
+    var known = LOWEST;
+    var place = 0u;
+    for (var number = first + local; number < end; number += WORKGROUP) {
+#if JACOBIAN
+        if number % LANES >= lanes_used[number / LANES] {
+            continue;
+        }
+        let value = -source[place_of(number, 0u)];
+#else
+        let value = source[place_of(number, 0u)];
+#endif
+        if value > known {
+            known = value;
+            place = number - first;
+        }
+    }
+    sums[local] = known;
+    places[local] = place;
+    for (var half = WORKGROUP / 2u; half > 0u; half = half / 2u) {
+        workgroupBarrier();
+        if local < half {
+            let other = sums[local + half];
+            let there = places[local + half];
+            if other > sums[local] || (other == sums[local] && there < places[local]) {
+                sums[local] = other;
+                places[local] = there;
+            }
+        }
+    }
+    if local == 0u {
+        totals[params.into + WORST * item] = sums[0];
+        totals[params.into + WORST * item + 1u] = f32(places[0]);
+    }
+}
+#endif
+#endif

@@ -1,0 +1,89 @@
+//! Energies that no force computes: kinetic energy, and that of stretched threads, as [totals](super::totals).
+
+use super::totals::{add_up, part};
+use crate::elements::beam2::TABLE;
+use crate::kernel::lane::{Lane, Real};
+use crate::kernel::node::Field;
+use crate::kernel::position::QUANTUM;
+use crate::kernel::shader::{Shader, WORKGROUP};
+use crate::kernel::stage::{Io, Kernel};
+use crate::kernel::vector::{add, apply, dot};
+use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
+
+/// Constants of the stage.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Params {
+    /// Nodes or beams.
+    pub count: u32,
+    /// Of them in a part.
+    pub length: u32,
+    /// Where the sums of the parts start.
+    pub into: u32,
+    /// Centre of mass in the reference, in quanta.
+    pub centre: [i32; 3],
+}
+
+pub const VELOCITY: usize = 0;
+pub const MASS: usize = 1;
+pub const REFERENCE: usize = 2;
+
+/// ½ Σ m v²; with `TOTAL`, v includes the affine motion Ḟ̄ (X − X_c), seen from the centre of mass.
+pub struct Kinetic<const TOTAL: bool>;
+
+impl<const TOTAL: bool> Kernel for Kinetic<TOTAL> {
+    const SHADER: Shader = Shader {
+        defines: if TOTAL { &["TOTAL"] } else { &[] },
+        invocations: WORKGROUP,
+        ..Shader::new("dynamics/energy", "kinetic")
+    };
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let params: Params = io.params();
+        let (velocity, mass) = (Field::new(io, VELOCITY), io.scalars(MASS));
+        let plane = mass.len();
+        let (half, quantum) = (L::Scalar::from_f64(0.5), L::Scalar::from_f64(QUANTUM));
+        let mut totals = io.scatter::<L::Scalar>(if TOTAL { 3 } else { 2 });
+        for item in items {
+            let sum = add_up(part(item, params.length, params.count), |node| {
+                let mut v = velocity.at(node);
+                if TOTAL {
+                    let reference = io.ints(REFERENCE);
+                    let x = [0, 1, 2].map(|k| {
+                        L::Scalar::from_i32(reference[node + k * plane].wrapping_sub(params.centre[k])) * quantum
+                    });
+                    v = add(v, apply(&io.row.rate, x));
+                }
+                half * mass[node] * dot(v, v)
+            });
+            totals.set(params.into as usize + item, sum);
+        }
+    }
+}
+
+pub const TENSION: usize = 0;
+pub const BEAMS: usize = 1;
+
+/// ½ Σ N² L₀/EA of beams.
+pub struct Axial;
+
+impl Kernel for Axial {
+    const SHADER: Shader = Shader { invocations: WORKGROUP, ..Shader::new("dynamics/energy", "axial") };
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let params: Params = io.params();
+        let (tension, beams) = (io.scalars(TENSION), io.scalars(BEAMS));
+        let half = L::Scalar::from_f64(0.5);
+        let mut totals = io.scatter::<L::Scalar>(2);
+        for item in items {
+            let sum = add_up(part(item, params.length, params.count), |beam| {
+                let (length, stiffness) = (beams[TABLE * beam + 3], beams[TABLE * beam + 4]);
+                half * tension[beam] * tension[beam] / stiffness * length
+            });
+            totals.set(params.into as usize + item, sum);
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Totals: columns of numbers added up, and the worst of them, part by part, so that the host reads a few numbers instead of
+//! one for every item.
+//!
+//! A part is a range of a column whose length depends only on that of the column. A workgroup works on a part: each of its
+//! invocations takes every 64th number, then the upper half is added to the lower until one sum is left. The CPU keeps the
+//! same sums side by side. The host adds the parts in f64.
+
+use crate::elements::hex8::LANES;
+use crate::kernel::lane::{Lane, Real};
+use crate::kernel::shader::{Shader, WORKGROUP};
+use crate::kernel::stage::{Io, Kernel};
+use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
+
+/// Constants of the stage: which numbers belong to a column.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Params {
+    /// First number of the first column.
+    pub start: u32,
+    /// Numbers of a column.
+    pub count: u32,
+    /// How many of them lie side by side.
+    pub lanes: u32,
+    /// From the first of these to the first of the next.
+    pub stride: u32,
+    /// Columns; each starts behind the lanes of the one before.
+    pub columns: u32,
+    /// Numbers of a part.
+    pub length: u32,
+    /// Where the results of the stage start.
+    pub into: u32,
+}
+
+/// The smallest part that is worth a workgroup.
+const SHORTEST: usize = 1024;
+/// The most parts of a column.
+const MOST: usize = 256;
+
+/// Length of the parts of a column of `count` numbers, and how many they are.
+pub fn parts(count: usize) -> (usize, usize) {
+    let length = count.div_ceil(MOST).max(SHORTEST).next_multiple_of(WORKGROUP);
+    (length, count.div_ceil(length))
+}
+
+/// Numbers of a part.
+#[inline(always)]
+pub fn part(number: usize, length: u32, count: u32) -> Range<usize> {
+    let first = number * length as usize;
+    first..(first + length as usize).min(count as usize)
+}
+
+/// Adds up the terms of a part.
+#[inline(always)]
+pub fn add_up<R: Real>(part: Range<usize>, mut term: impl FnMut(usize) -> R) -> R {
+    let mut sums = [R::from_f64(0.0); WORKGROUP];
+    for (place, number) in part.enumerate() {
+        let sum = &mut sums[place % WORKGROUP];
+        *sum = *sum + term(number);
+    }
+    let mut half = WORKGROUP / 2;
+    while half > 0 {
+        for i in 0..half {
+            sums[i] = sums[i] + sums[i + half];
+        }
+        half /= 2;
+    }
+    sums[0]
+}
+
+/// Below every value: what the worst of nothing is.
+const LOWEST: f64 = -1e30;
+
+/// The largest value of a part, and its place there; of equal ones the first.
+#[inline(always)]
+fn largest<R: Real>(part: Range<usize>, value: impl Fn(usize) -> R) -> (R, usize) {
+    let mut found = [(R::from_f64(LOWEST), 0); WORKGROUP];
+    for (place, number) in part.enumerate() {
+        let value = value(number);
+        let known = &mut found[place % WORKGROUP];
+        if value > known.0 {
+            *known = (value, place);
+        }
+    }
+    let first = found[0];
+    found[1..].iter().fold(first, |a, b| if b.0 > a.0 || b.0 == a.0 && b.1 < a.1 { *b } else { a })
+}
+
+impl Params {
+    /// Where a number of a column is.
+    #[inline(always)]
+    fn place(&self, number: usize, column: usize) -> usize {
+        let lanes = self.lanes as usize;
+        self.start as usize + number / lanes * self.stride as usize + column * lanes + number % lanes
+    }
+}
+
+pub const SOURCE: usize = 0;
+
+/// Sums of columns, the columns of a part side by side; with `TAKEN` the numbers are set back to zero.
+pub struct Sum<const TAKEN: bool>;
+
+impl<const TAKEN: bool> Kernel for Sum<TAKEN> {
+    const SHADER: Shader = Shader {
+        defines: if TAKEN { &["TAKEN"] } else { &[] },
+        invocations: WORKGROUP,
+        ..Shader::new("dynamics/totals", "sum")
+    };
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        const TOTALS: usize = 1;
+        let params: Params = io.params();
+        let columns = params.columns as usize;
+        let mut totals = io.scatter::<L::Scalar>(TOTALS);
+        for item in items {
+            let (number, column) = (item / columns, item % columns);
+            let part = part(number, params.length, params.count);
+            let sum = if TAKEN {
+                let mut source = io.scatter::<L::Scalar>(SOURCE);
+                add_up(part, |number| {
+                    let place = params.place(number, column);
+                    let value = source.get(place);
+                    source.set(place, L::Scalar::from_f64(0.0));
+                    value
+                })
+            } else {
+                let source = io.scalars(SOURCE);
+                add_up(part, |number| source[params.place(number, column)])
+            };
+            totals.set(params.into as usize + item, sum);
+        }
+    }
+}
+
+/// Numbers that [`Worst`] leaves for a part.
+pub const WORST: usize = 2;
+
+/// The largest number of a column, and its place in the part; with `JACOBIAN` the largest of −det F in lanes that are in use.
+pub struct Worst<const JACOBIAN: bool>;
+
+impl<const JACOBIAN: bool> Kernel for Worst<JACOBIAN> {
+    const SHADER: Shader = Shader {
+        defines: if JACOBIAN { &["JACOBIAN"] } else { &[] },
+        invocations: WORKGROUP,
+        ..Shader::new("dynamics/totals", "worst")
+    };
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        /// Lanes in use of each block of hexahedra.
+        const LANES_USED: usize = 1;
+        let params: Params = io.params();
+        let source = io.scalars(SOURCE);
+        let mut totals = io.scatter::<L::Scalar>(if JACOBIAN { 2 } else { 1 });
+        for item in items {
+            let part = part(item, params.length, params.count);
+            let (value, place) = if JACOBIAN {
+                let used = io.uints(LANES_USED);
+                let in_use = |number: usize| number % LANES < used[number / LANES] as usize;
+                let lowest = L::Scalar::from_f64(LOWEST);
+                largest(part, |n| if in_use(n) { -source[params.place(n, 0)] } else { lowest })
+            } else {
+                largest(part, |number| source[params.place(number, 0)])
+            };
+            totals.set(params.into as usize + WORST * item, value);
+            totals.set(params.into as usize + WORST * item + 1, L::Scalar::from_i32(place as i32));
+        }
+    }
+}
