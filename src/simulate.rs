@@ -1,7 +1,8 @@
 //! A scene in time: drives a backend through the schedule, keeps the energy ledger, and stops what goes wrong. It writes no files.
 //!
-//! Steps run in bursts. After each burst the distance travelled decides on a contact search; after each window of bursts
-//! the sums that kernels keep per item are added up there, and only totals come to the host: energies and the limit of the time step are taken, and guards look.
+//! Steps run in bursts, which grow as long as speeds do not and the contact skin is sure to last. After each burst the distance
+//! travelled decides on a contact search. After each window of bursts the sums that kernels keep per item are added up on the
+//! backend, only totals come to the host, and guards look at energies and limits.
 
 mod guards;
 mod ledger;
@@ -26,10 +27,12 @@ use crate::plan::{self, Capacity, Model};
 use crate::schedule::{Load, Schedule};
 use std::sync::Arc;
 
-/// Steps between two looks at the distance travelled.
+/// Fewest steps between two looks at the distance travelled.
 const BURST: u64 = 8;
-/// Bursts between two looks at energies and limits.
-const WINDOW: u64 = 8;
+/// Steps between two looks at energies and limits; the longest burst.
+const WINDOW: u64 = 64;
+/// Growth of the largest speed over a burst after which bursts start short again.
+const CALM: f64 = 1.4;
 /// Share of the contact skin that nodes may travel before a search.
 const SKIN_USED: f64 = 0.35;
 /// Length over which the affine motion between two searches is counted, mm.
@@ -79,6 +82,8 @@ pub struct Simulation {
     searches: u64,
     /// Largest speed of a node after the last burst, mm/s.
     speed: f64,
+    /// Steps of the next burst.
+    burst: u64,
     /// Step of the last look at energies and limits.
     diagnosed: u64,
     gradient_at_search: Load,
@@ -162,6 +167,7 @@ impl Simulation {
             dt_before: 0.0,
             searches: 0,
             speed: 1e9,
+            burst: BURST,
             diagnosed: 0,
             energies: Energies::default(),
             start_energy: 0.0,
@@ -224,12 +230,9 @@ impl Simulation {
         }
         while self.time < until * (1.0 - 1e-12) {
             let (from, steps) = (self.time - self.dt_before, self.step);
-            for _ in 0..WINDOW {
+            while self.step < steps + WINDOW && self.time < until * (1.0 - 1e-12) {
                 let remaining = ((until - self.time) / self.dt).ceil().max(1.0) as u64;
-                self.burst(remaining.min(BURST))?;
-                if self.time >= until * (1.0 - 1e-12) {
-                    break;
-                }
+                self.burst(remaining.min(self.burst).min(steps + WINDOW - self.step))?;
             }
             self.look(self.step - steps, from, self.time - self.dt)?;
             if stop(self) {
@@ -273,14 +276,20 @@ impl Simulation {
         let status = self.backend.uints(self.model.buffers.status);
         self.alive()?;
         self.check_flags(&status)?;
-        self.speed = f64::from(f32::from_bits(status[status::SPEED]));
+        let before = std::mem::replace(&mut self.speed, f64::from(f32::from_bits(status[status::SPEED])));
         let travel = f64::from(f32::from_bits(status[status::TRAVEL]));
         let load = self.load();
         let affine = (load.angle - self.gradient_at_search.angle).abs() * AFFINE_REACH;
         let skin = self.case.effects.contact.as_ref().map_or(f64::INFINITY, |c| c.skin_mm);
-        if travel + affine > SKIN_USED * skin || load.radius > self.gradient_at_search.radius {
+        let mut left = SKIN_USED * skin - travel - affine;
+        if left < 0.0 || load.radius > self.gradient_at_search.radius {
             self.search()?;
+            left = SKIN_USED * skin;
         }
+        // a float that is too large for an integer becomes the largest one
+        let sure = (left / (SPEED_MARGIN * self.speed * self.dt)) as u64;
+        let longer = if self.speed > CALM * before { BURST } else { 2 * self.burst };
+        self.burst = longer.min(sure).clamp(BURST, WINDOW);
         Ok(())
     }
 

@@ -68,6 +68,8 @@ fn free() -> Value {
             ("/effects/fibre_lines", json!({})),
             ("/effects/contact", json!({})),
             ("/steps", json!([{ "move": { "time_s": 1e-4 } }])),
+            // bodies start pressed together
+            ("/integration", json!({ "energy_tolerance": 100 })),
         ],
     )
 }
