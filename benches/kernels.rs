@@ -29,7 +29,7 @@ const BARE_BLOCKS: usize = 32;
 fn main() {
     let loaded = read(Path::new("cases/unit_cell_shear.json"), &QUICK.map(String::from)).expect("the case is valid");
     let make = Make { threads: 1, ..Make::default() };
-    let mut cell = simulation(&loaded, make).expect("the cell can be built");
+    let mut cell = simulation(&loaded, make.clone()).expect("the cell can be built");
     cell.advance(START, |_| false).expect("the cell runs");
 
     let row = cell.schedule.row(cell.time(), cell.dt(), cell.dt());
@@ -40,14 +40,14 @@ fn main() {
         .configure_from_args();
     let plan = cell.model.plan.clone();
     for stage in &plan.step {
-        bench(&mut criterion, stage.name, &cell, make, std::slice::from_ref(stage), row);
+        bench(&mut criterion, stage.name, &cell, &make, std::slice::from_ref(stage), row);
     }
     for (name, stages) in [("all of search", &plan.search), ("all of diagnose", &plan.diagnose)] {
-        bench(&mut criterion, name, &cell, make, stages, row);
+        bench(&mut criterion, name, &cell, &make, stages, row);
     }
     criterion.final_summary();
 
-    let bare = bare(&cell, make, row);
+    let bare = bare(&cell, &make, row);
     report(&mut cell, bare);
 }
 
@@ -62,7 +62,7 @@ fn advance(cell: &mut Simulation, steps: u64) -> u64 {
 }
 
 /// A backend in the state of a simulation.
-fn copy(cell: &Simulation, make: Make) -> Cpu<f32> {
+fn copy(cell: &Simulation, make: &Make) -> Cpu<f32> {
     let mut backend = Cpu::new(&cell.model.plan.buffers, make.threads, make.isa);
     for buffer in (0..cell.model.plan.buffers.len()).map(Buffer) {
         backend.set_bytes(buffer, &cell.backend().bytes(buffer));
@@ -70,7 +70,7 @@ fn copy(cell: &Simulation, make: Make) -> Cpu<f32> {
     backend
 }
 
-fn bench(criterion: &mut Criterion, name: &str, cell: &Simulation, make: Make, stages: &[Stage], row: Row<f64>) {
+fn bench(criterion: &mut Criterion, name: &str, cell: &Simulation, make: &Make, stages: &[Stage], row: Row<f64>) {
     let mut backend = copy(cell, make);
     criterion.bench_function(name, |bencher| {
         bencher.iter_custom(|count| {
@@ -83,7 +83,7 @@ fn bench(criterion: &mut Criterion, name: &str, cell: &Simulation, make: Make, s
 }
 
 /// Hexahedra per second of the kernel alone, the best of some repetitions.
-fn bare(cell: &Simulation, make: Make, row: Row<f64>) -> f64 {
+fn bare(cell: &Simulation, make: &Make, row: Row<f64>) -> f64 {
     const ROUNDS: usize = 200;
     let model = &cell.model;
     let stage = model.plan.step.iter().find(|s| s.name == "hex8").expect("the cell has hexahedra");

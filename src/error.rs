@@ -76,8 +76,7 @@ impl fmt::Display for Error {
             Error::Geometry { what, message } => write!(f, "{what}: {message}"),
             Error::File { path, message } => write!(f, "{}: {message}", path.display()),
             Error::Guard(guard) => write!(f, "{guard}"),
-            Error::Unsupported(message) | Error::Device(message) => f.write_str(message),
-            Error::Shader(message) => write!(f, "shader {message}"),
+            Error::Unsupported(message) | Error::Device(message) | Error::Shader(message) => f.write_str(message),
         }
     }
 }

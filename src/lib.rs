@@ -33,7 +33,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`error`] | the one error type: every message names its culprit |
-//! | [`kernel`] | what backends share: lanes, elementary functions, positions in quanta, buffers, stages |
+//! | [`kernel`] | what backends share: lanes, elementary functions, positions in quanta, buffers, stages, the text of shaders |
 //! | [`case`] | what a user writes: typed JSON with units, ranges, defaults, schema and overrides |
 //! | [`mesh`] | nodes, blocks of hexahedra, threads, frames (deformed states), surfaces, quality |
 //! | [`fabric`] | from parameters to geometry: yarn sections, the path of the stitch, the cell |
@@ -43,7 +43,7 @@
 //! | [`dynamics`] | assembly, fibre lines, integration, limit of the time step |
 //! | [`conditions`] | prescribed motion |
 //! | [`plan`] | the scene as buffers and stages; reading it is reading the algorithm |
-//! | [`backend`] | runs stages: the CPU, with threads and registers of any width |
+//! | [`backend`] | runs stages: the CPU, with threads and registers of any width; a GPU, with the WGSL twins of the kernels |
 //! | [`measure`] | widths, thicknesses, gaps, tensions, shear force |
 //! | [`schedule`] | load steps as smooth functions of time |
 //! | [`output`] | frames, tables, pictures |
@@ -57,9 +57,9 @@
 //! Moreover, the backend knows only `error` and `kernel`, and `output` does not know `measure`.
 //!
 //! # Where to add
-//! - **A material**: a file in `materials` with `impl Material`, an arm in `materials::Law` and in
+//! - **A material**: a file in `materials` with `impl Material` and its twin under `shaders`, an arm in `materials::Law` and in
 //!   [`case::fabric::Material`]. The tests of `materials` compare its stress with differences of its energy.
-//! - **An element**: a kernel in `elements`, its tables and a stage in `plan`, its slots in [`dynamics::assemble`].
+//! - **An element**: a kernel in `elements` and its twin, its tables and a stage in `plan`, its slots in [`dynamics::assemble`].
 //! - **A contact law**: beside `contact::friction`; it sees one pair with its state and returns a force.
 //! - **A measure**: a file in `measure`, from [`mesh::Mesh`] and [`mesh::frame::Frame`]; a column in [`output::table`].
 //! - **A scene**: a JSON file in `cases/`. `tricot schema` lists every field.

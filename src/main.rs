@@ -37,6 +37,7 @@ Exit codes:
   3    a guard stopped the run; results so far stay on disk
   4    a file or folder could not be read or written
   5    this build or machine cannot do it
+  6    a GPU failed; results so far stay on disk
   130  interrupted; results so far stay on disk";
 
 #[derive(Subcommand)]
@@ -54,6 +55,12 @@ enum Command {
         /// Number of threads [default: all cores]; results do not depend on it
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
         threads: Option<u16>,
+        /// What runs the scene; auto takes a discrete GPU if there is one
+        #[arg(long, default_value = "auto")]
+        backend: Machine,
+        /// Part of the name of the adapter, for a machine with several (see `tricot devices`)
+        #[arg(long, value_name = "NAME", default_value = "", hide_default_value = true)]
+        adapter: String,
         /// Use a folder that holds results: they are moved to DIR/previous-N
         #[arg(long)]
         force: bool,
@@ -83,6 +90,8 @@ enum Command {
         #[arg(long)]
         fabric: bool,
     },
+    /// List the adapters that --backend gpu can use, with their limits.
+    Devices,
     /// Draw a frame as PNG.
     Picture {
         /// Folder of a run (its last frame is drawn), or a frame (.vtu)
@@ -122,6 +131,23 @@ enum Scalar {
     F64,
 }
 
+#[derive(Clone, Copy, ValueEnum)]
+enum Machine {
+    Auto,
+    Cpu,
+    Gpu,
+}
+
+impl From<Machine> for run::Machine {
+    fn from(machine: Machine) -> Self {
+        match machine {
+            Machine::Auto => Self::Auto,
+            Machine::Cpu => Self::Cpu,
+            Machine::Gpu => Self::Gpu,
+        }
+    }
+}
+
 impl From<Scalar> for steps::Precision {
     fn from(scalar: Scalar) -> Self {
         match scalar {
@@ -155,12 +181,14 @@ fn main() -> ExitCode {
 
 fn perform(command: Command) -> Result<Done> {
     let text = match command {
-        Command::Run { case, output, precision, threads, force, quiet } => {
+        Command::Run { case, output, precision, threads, backend, adapter, force, quiet } => {
             let loaded = case.read()?;
             let options = run::Options {
                 output: output.unwrap_or_else(|| directory::default(&case.case)),
                 precision: precision.map(Into::into),
                 threads: threads.map(usize::from),
+                machine: backend.into(),
+                adapter,
                 force,
                 quiet,
             };
@@ -178,6 +206,7 @@ fn perform(command: Command) -> Result<Done> {
             run::mesh(&case.read()?, &dir)?
         }
         Command::Check { case, explain } => run::check(&case.read()?, explain)?,
+        Command::Devices => run::devices(),
         Command::Schema { fabric } => schema::text(&if fabric { schema::fabric() } else { schema::case() }),
         Command::Picture { source, field, width, output } => {
             let out = output.unwrap_or_else(|| picture_path(&source));

@@ -11,18 +11,21 @@ pub use ledger::Energies;
 
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
+use crate::backend::gpu::{Device, Gpu};
 use crate::case::Case;
 use crate::case::steps::Precision;
 use crate::contact::status;
+use crate::contact::threads::MOST_PAIRS;
 use crate::dynamics::time_step;
 use crate::elements::hex8::LANES;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::kernel::buffer::Buffer;
 use crate::kernel::lane::Isa;
 use crate::kernel::row::Row;
 use crate::mesh::Mesh;
 use crate::plan::{self, Capacity, Model};
 use crate::schedule::{Load, Schedule};
+use std::sync::Arc;
 
 /// Steps between two looks at the distance travelled.
 const BURST: u64 = 8;
@@ -90,26 +93,36 @@ pub struct Simulation {
 }
 
 /// How to make a backend.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Make {
     pub precision: Precision,
-    /// 0 for all cores.
+    /// Threads of the CPU; 0 for all cores.
     pub threads: usize,
     pub isa: Isa,
+    /// The device that runs the scene; `None` for the CPU.
+    pub device: Option<Arc<Device>>,
 }
 
 impl Default for Make {
     fn default() -> Self {
-        Self { precision: Precision::F32, threads: 0, isa: Isa::best() }
+        Self { precision: Precision::F32, threads: 0, isa: Isa::best(), device: None }
     }
 }
 
 impl Make {
-    fn backend(&self, model: &Model) -> Box<dyn Backend> {
-        match self.precision {
-            Precision::F32 => Box::new(Cpu::<f32>::new(&model.plan.buffers, self.threads, self.isa)),
-            Precision::F64 => Box::new(Cpu::<f64>::new(&model.plan.buffers, self.threads, self.isa)),
-        }
+    /// # Errors
+    /// A scene that the device cannot hold or compute.
+    fn backend(&self, model: &Model) -> Result<Box<dyn Backend>> {
+        let buffers = &model.plan.buffers;
+        Ok(match (&self.device, self.precision) {
+            (None, Precision::F32) => Box::new(Cpu::<f32>::new(buffers, self.threads, self.isa)),
+            (None, Precision::F64) => Box::new(Cpu::<f64>::new(buffers, self.threads, self.isa)),
+            (Some(device), Precision::F32) => Box::new(Gpu::new(Arc::clone(device), buffers)?),
+            (Some(_), Precision::F64) => {
+                let what = "a GPU computes in f32 only; set integration.precision to f32, or use --backend cpu";
+                return Err(Error::Unsupported(what.into()));
+            }
+        })
     }
 }
 
@@ -135,7 +148,7 @@ impl Simulation {
     /// Geometry that cannot be run.
     pub fn with_capacity(case: &Case, friction: f64, mesh: Mesh, make: Make, capacity: Capacity) -> Result<Self> {
         let model = plan::build(case, friction, &mesh, capacity)?;
-        let backend = make.backend(&model);
+        let backend = make.backend(&model)?;
         let slip = vec![0.0; model.slaves.len()];
         let schedule = Schedule::new(&case.steps, &case.effects);
         Ok(Self {
@@ -192,6 +205,14 @@ impl Simulation {
     pub fn backend(&self) -> &dyn Backend {
         &*self.backend
     }
+    /// Whether the backend still computes.
+    ///
+    /// # Errors
+    /// What made it fail: numbers read from it since then are void.
+    pub fn alive(&self) -> Result<()> {
+        let at = |fault| format!("{fault}; noticed at step {} (t = {:.6e} s)", self.step, self.time);
+        self.backend.fault().map_or(Ok(()), |fault| Err(Error::Device(at(fault))))
+    }
     /// Whether the schedule has come to its end.
     pub fn done(&self) -> bool {
         self.time >= self.schedule.end() * (1.0 - 1e-12)
@@ -200,7 +221,7 @@ impl Simulation {
     /// Goes on until `until` (s), or until `stop` says so after a burst. The last step ends at or just behind `until`.
     ///
     /// # Errors
-    /// A guard that was provoked.
+    /// A guard that was provoked, or a device that failed.
     pub fn advance(&mut self, until: f64, mut stop: impl FnMut(&Self) -> bool) -> Result<()> {
         if !self.ready {
             self.begin()?;
@@ -214,6 +235,7 @@ impl Simulation {
                     break;
                 }
             }
+            self.alive()?;
             let work = self.collect_stress(self.step - steps, from, self.time - self.dt);
             self.energies.external += work;
             self.look()?;
@@ -256,6 +278,7 @@ impl Simulation {
         self.step += steps;
         self.backend.run(&self.model.plan.watch, &rows[..1]);
         let status = self.backend.uints(self.model.buffers.status);
+        self.alive()?;
         self.check_flags(&status)?;
         self.speed = f64::from(f32::from_bits(status[status::SPEED]));
         let travel = f64::from(f32::from_bits(status[status::TRAVEL]));
@@ -274,14 +297,14 @@ impl Simulation {
             return Ok(());
         }
         // what an overflowing search drops depends on the order in which cells were filled: it must leave no trace
-        let b = &self.model.buffers;
-        let state = [b.contact_keys, b.contact_state, b.pair_keys, b.pair_state];
-        let mut known: Vec<(Buffer, Vec<u8>)> =
-            state.into_iter().flatten().map(|buffer| (buffer, self.backend.bytes(buffer))).collect();
         for _ in 0..8 {
+            let b = &self.model.buffers;
+            let known = [b.contact_keys, b.contact_state, b.pair_keys, b.pair_state];
+            self.backend.save(&known.into_iter().flatten().collect::<Vec<_>>());
             let row = self.schedule.row(self.time, self.dt, self.dt_before);
             self.backend.run(&self.model.plan.search, &[row]);
             let status = self.backend.uints(self.model.buffers.status);
+            self.alive()?;
             let full = status[status::FLAGS] & (status::CELL_FULL | status::SLOTS_FULL);
             self.clear_travel(&status);
             if full == 0 {
@@ -296,15 +319,10 @@ impl Simulation {
             }
             if full & status::SLOTS_FULL != 0 {
                 capacity.slots = (capacity.slots * 2).min(16);
-                capacity.beam_slots *= 2;
+                capacity.beam_slots = (capacity.beam_slots * 2).min(MOST_PAIRS);
             }
-            for (buffer, bytes) in &known {
-                self.backend.set_bytes(*buffer, bytes);
-            }
+            self.backend.restore();
             self.grow(capacity)?;
-            for (buffer, bytes) in &mut known {
-                *bytes = self.backend.bytes(*buffer);
-            }
         }
         Err(self.guard(
             "contact overflow",
@@ -316,7 +334,7 @@ impl Simulation {
     /// Moves the state into a plan with larger contact tables.
     fn grow(&mut self, capacity: Capacity) -> Result<()> {
         let model = plan::build(&self.case, self.friction, &self.mesh, capacity)?;
-        let mut backend = self.make.backend(&model);
+        let mut backend = self.make.backend(&model)?;
         for (old, description) in self.model.plan.buffers.iter().enumerate() {
             let new = model.plan.buffers.iter().position(|d| d.name == description.name);
             let Some(new) = new.filter(|_| !matches!(description.name, "items of cells" | "cells" | "status")) else {
@@ -330,6 +348,7 @@ impl Simulation {
             };
             backend.set_bytes(Buffer(new), &bytes);
         }
+        self.alive()?;
         self.model = model;
         self.backend = backend;
         self.capacity = capacity;

@@ -28,10 +28,10 @@ fn cell() -> Value {
 fn bits_do_not_depend_on_threads_or_instruction_set() {
     for precision in [Precision::F32, Precision::F64] {
         let mut hashes = vec![];
-        let mut makes: Vec<Make> = [1, 1, 2, 7].map(|threads| Make { precision, threads, isa: Isa::best() }).into();
-        makes.extend(Isa::available().into_iter().map(|isa| Make { precision, threads: 2, isa }));
+        let mut makes: Vec<Make> = [1, 1, 2, 7].map(|threads| Make { precision, threads, ..Make::default() }).into();
+        makes.extend(Isa::available().into_iter().map(|isa| Make { precision, threads: 2, isa, ..Make::default() }));
         for make in makes {
-            let mut simulation = run::simulation(&loaded(&cell()), make).unwrap();
+            let mut simulation = run::simulation(&loaded(&cell()), make.clone()).unwrap();
             advance(&mut simulation, 2.5e-4);
             let touching = simulation.health().touching;
             let hash = simulation.state_hash();

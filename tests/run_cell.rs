@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use tricot::case::read::{Loaded, read};
 use tricot::output::table::{HISTORY, STITCHES, YARNS};
 use tricot::output::vtu_read;
-use tricot::run::{Options, Outcome, picture, run};
+use tricot::run::{Machine, Options, Outcome, picture, run};
 use tricot::simulate::Make;
 
 const CASE: &str = "cases/unit_cell_shear.json";
@@ -36,7 +36,15 @@ fn coarse() -> Loaded {
 }
 
 fn options(output: PathBuf, threads: usize) -> Options {
-    Options { output, precision: None, threads: Some(threads), force: false, quiet: true }
+    Options {
+        output,
+        precision: None,
+        threads: Some(threads),
+        machine: Machine::Cpu,
+        adapter: String::new(),
+        force: false,
+        quiet: true,
+    }
 }
 
 fn ran() -> (TempDir, Outcome) {

@@ -73,7 +73,10 @@ fn stages() -> Vec<(String, Stage, Vec<Description>)> {
     all
 }
 
-/// Name, offset and size of the fields of a struct.
+/// Name, offset and size of a field.
+type Field<N> = (N, usize, usize);
+
+/// The fields of a struct.
 macro_rules! fields {
     ($type:ty: $($field:ident),*) => {{
         fn size<T, F>(_: fn(&T) -> &F) -> usize {
@@ -86,7 +89,7 @@ macro_rules! fields {
 }
 
 /// The parameters of each file of kernels, as Rust lays them out.
-fn parameters(file: &str) -> Vec<(&'static str, usize, usize)> {
+fn parameters(file: &str) -> Vec<Field<&'static str>> {
     match file {
         "elements/hex8" => fields!(elements::hex8::Params: nodes),
         "contact/grid" | "contact/candidates" | "contact/penalty" | "contact/threads" => fields!(
@@ -105,10 +108,10 @@ fn parameters(file: &str) -> Vec<(&'static str, usize, usize)> {
 }
 
 /// The members of a uniform struct: those named `field_x`, `field_xy` and so on belong to one array `field`.
-fn members(module: &naga::Module, name: &str) -> Option<(Vec<(String, usize, usize)>, u32)> {
+fn members(module: &naga::Module, name: &str) -> Option<(Vec<Field<String>>, u32)> {
     let (_, variable) = module.global_variables.iter().find(|(_, v)| v.name.as_deref() == Some(name))?;
     let TypeInner::Struct { members, span } = &module.types[variable.ty].inner else { panic!("{name} is no struct") };
-    let mut merged: Vec<(String, usize, usize)> = Vec::new();
+    let mut merged: Vec<Field<String>> = Vec::new();
     for member in members {
         let full = member.name.clone().unwrap();
         let stem = match full.rsplit_once('_') {
@@ -130,7 +133,7 @@ fn members(module: &naga::Module, name: &str) -> Option<(Vec<(String, usize, usi
 /// Compares what the twin of a stage sees with what the stage binds.
 fn check(name: &str, stage: &Stage, buffers: &[Description]) {
     let shader = stage.kernel.shader;
-    let text = Text::of(&stage).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let text = Text::of(stage).unwrap_or_else(|e| panic!("{name}: {e}"));
     let (module, info) = text.module().unwrap_or_else(|e| panic!("{name}: {e}"));
     let entry = module.entry_points.iter().position(|e| e.name == shader.entry);
     let entry = entry.unwrap_or_else(|| panic!("{name}: no entry point {}", shader.entry));
@@ -166,7 +169,7 @@ fn check(name: &str, stage: &Stage, buffers: &[Description]) {
     assert_eq!(found, expected.keys().copied().collect::<Vec<_>>(), "{name}: bindings");
     let expected = parameters(shader.file);
     if let Some((members, span)) = members(&module, "params") {
-        let names: Vec<(&str, usize, usize)> = members.iter().map(|(n, o, s)| (n.as_str(), *o, *s)).collect();
+        let names: Vec<Field<&str>> = members.iter().map(|(n, o, s)| (n.as_str(), *o, *s)).collect();
         assert_eq!(names, expected, "{name}: parameters");
         assert!(
             (span as usize).next_multiple_of(16) == stage.params.len().next_multiple_of(16),
@@ -174,7 +177,7 @@ fn check(name: &str, stage: &Stage, buffers: &[Description]) {
         );
     }
     if let Some((members, _)) = members(&module, "row") {
-        let names: Vec<(&str, usize, usize)> = members.iter().map(|(n, o, s)| (n.as_str(), *o, *s)).collect();
+        let names: Vec<Field<&str>> = members.iter().map(|(n, o, s)| (n.as_str(), *o, *s)).collect();
         let row = fields!(
             Row<f32>: gradient, rate, dt, dt_mid, thermal, thermal_increment, radius, radius_increment, damping_solid,
             damping_thread, motion, approach

@@ -4,6 +4,7 @@
 #include "kernel/stage"
 #define REFERENCE
 #include "kernel/node"
+#include "kernel/vector"
 #include "elements/hex8"
 
 #if ROOT
@@ -36,10 +37,8 @@ var<workgroup> rows: array<vec4<f32>, STATIONS>;
 // Current direction of the segment between two nodes.
 fn direction(here: u32, next: u32, shift: vec2<i32>) -> vec3<f32> {
     let rest = lattice_between(next, here, shift);
-    let g = gradient();
-    let affine = vec3<f32>(dot(g[0], rest), dot(g[1], rest), dot(g[2], rest));
-    let v = rest + affine + displacement_between(next, here);
-    return v * (1.0 / sqrt(dot(v, v)));
+    let v = rest + apply(gradient(), rest) + displacement_between(next, here);
+    return v * (1.0 / norm(v));
 }
 
 fn acceleration_at(node: u32) -> vec3<f32> {

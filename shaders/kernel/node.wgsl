@@ -29,8 +29,8 @@ fn velocity_at(node: u32) -> vec3<f32> {
 // Reference position of `a` less that of `b`, plus whole quanta `shift` along x and y, mm.
 fn lattice_between(a: u32, b: u32, shift: vec2<i32>) -> vec3<f32> {
     let plane = arrayLength(&reference) / 3u;
-    let start = vec3<i32>(reference[b], reference[b + plane], reference[b + 2u * plane]);
-    let end = vec3<i32>(reference[a], reference[a + plane], reference[a + 2u * plane]);
-    return vec3<f32>(end - start + vec3<i32>(shift, 0)) * QUANTUM;
+    let base = vec3<i32>(reference[b], reference[b + plane], reference[b + 2u * plane]);
+    let to = vec3<i32>(reference[a], reference[a + plane], reference[a + 2u * plane]);
+    return vec3<f32>(to - base + vec3<i32>(shift, 0)) * QUANTUM;
 }
 #endif

@@ -15,6 +15,7 @@ use std::time::Instant;
 /// Buffers in host memory, and threads to work on them.
 pub struct Cpu<R: Real> {
     arrays: Vec<Array>,
+    saved: Vec<(Buffer, Array)>,
     isa: Isa,
     pool: Option<rayon::ThreadPool>,
     threads: usize,
@@ -52,6 +53,7 @@ impl<R: Precision> Cpu<R> {
         });
         Self {
             arrays: buffers.iter().map(Array::new::<R>).collect(),
+            saved: Vec::new(),
             isa,
             pool,
             threads,
@@ -140,11 +142,10 @@ impl<R: Precision> Backend for Cpu<R> {
                 spent: spent.expect("every stage has a timer"),
             });
             let number = group.stages.len() - 1;
-            group.chunks.extend(
-                (0..stage.count)
-                    .step_by(stage.grain)
-                    .map(|first| Chunk { stage: number, items: first..(first + stage.grain).min(stage.count) }),
-            );
+            group.chunks.extend((stage.first..stage.first + stage.count).step_by(stage.grain).map(|first| Chunk {
+                stage: number,
+                items: first..(first + stage.grain).min(stage.first + stage.count),
+            }));
         }
         match &self.pool {
             Some(pool) => pool.install(|| Self::run_groups(&groups, &rows, true)),
@@ -180,6 +181,16 @@ impl<R: Precision> Backend for Cpu<R> {
 
     fn set_bytes(&mut self, buffer: Buffer, bytes: &[u8]) {
         self.arrays[buffer.0].set_bytes(bytes);
+    }
+
+    fn save(&mut self, buffers: &[Buffer]) {
+        self.saved = buffers.iter().map(|b| (*b, self.arrays[b.0].clone())).collect();
+    }
+
+    fn restore(&mut self) {
+        for (buffer, array) in &self.saved {
+            self.arrays[buffer.0].set_bytes(array.bytes());
+        }
     }
 
     fn timings(&self) -> Vec<(&'static str, f64)> {

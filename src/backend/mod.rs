@@ -1,6 +1,7 @@
 //! Backends run stages on buffers. They know no physics.
 
 pub mod cpu;
+pub mod gpu;
 
 use crate::kernel::buffer::Buffer;
 use crate::kernel::row::Row;
@@ -24,6 +25,14 @@ pub trait Backend {
     fn bytes(&self, buffer: Buffer) -> Vec<u8>;
     /// Replaces the bytes of a buffer of the same length.
     fn set_bytes(&mut self, buffer: Buffer, bytes: &[u8]);
+    /// Keeps a copy of some buffers, in place of the copies kept before.
+    fn save(&mut self, buffers: &[Buffer]);
+    /// Brings back what was saved last.
+    fn restore(&mut self);
+    /// What made the device fail, once it has: numbers read since then are void.
+    fn fault(&self) -> Option<String> {
+        None
+    }
     /// Seconds spent in each stage so far, by name, in the order of first use.
     fn timings(&self) -> Vec<(&'static str, f64)>;
     /// One line for reports.

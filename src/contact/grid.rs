@@ -21,6 +21,8 @@ pub const BOX: usize = 6;
 pub const SLAB: usize = 3;
 /// Faces of a slab at most.
 pub const SLAB_FACES: usize = 8;
+/// More than rounding moves a place in the plane, mm: an item must not be in too few cells.
+const ROUNDING: f64 = 1e-4;
 
 /// See [`SLAB`].
 pub const SLABS: usize = 0;
@@ -83,9 +85,11 @@ pub fn absolute<R: Real>(io: &Io<R>, bindings: [usize; 3], inverse: &[[R; 2]; 2]
 /// First and last cell along one axis for an interval of the pulled-back plane; the last may lie behind the first by whole periods.
 #[inline(always)]
 pub fn cells<R: Real>(params: &Params, axis: usize, low: R, high: R) -> (i32, i32) {
+    let real = |x: f32| R::from_f64(f64::from(x));
     let cell = |x: R| {
-        let x = (x.to_f64() - f64::from(params.origin[axis])) / f64::from(params.cell[axis]);
-        libm::floor(x.clamp(-1e6, 1e6)) as i32
+        let x = ((x - real(params.origin[axis])) / real(params.cell[axis])).max(real(-1e6)).min(real(1e6));
+        let near = x.to_i32();
+        near - i32::from(x < R::from_i32(near))
     };
     let (low, high, count) = (cell(low), cell(high), params.cells[axis] as i32);
     if params.period[axis] != 0 {
@@ -164,7 +168,8 @@ impl Kernel for Fill {
             ]);
             let range = |k: usize| {
                 let reach = reach * (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt();
-                cells(&params, k, base[k] + low[k] - reach, base[k] + high[k] + reach)
+                let room = reach + L::Scalar::from_f64(ROUNDING);
+                cells(&params, k, base[k] + low[k] - room, base[k] + high[k] + room)
             };
             let ((x0, x1), (y0, y1)) = (range(0), range(1));
             for y in y0..=y1 {

@@ -21,15 +21,14 @@ use std::sync::atomic::Ordering;
 pub const ARC: usize = 3;
 /// Numbers of a slot: elastic tangential displacement, mm (3); normal force, N.
 pub const STATE: usize = 4;
+/// Pairs that a beam can have.
+pub const MOST_PAIRS: usize = 64;
 
-/// Thread of each beam.
-pub const THREADS: usize = 0;
-pub const ARCS: usize = 1;
-pub const ENDS: usize = 2;
-pub const BEAMS: usize = 3;
-pub const REFERENCE: usize = 4;
-pub const QUANTA: usize = 5;
-pub const REMAINDER: usize = 6;
+pub const ENDS: usize = 0;
+pub const BEAMS: usize = 1;
+pub const REFERENCE: usize = 2;
+pub const QUANTA: usize = 3;
+pub const REMAINDER: usize = 4;
 
 /// Finds pairs of beams.
 pub struct Pairs;
@@ -107,6 +106,9 @@ impl Kernel for Pairs {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        // thread of each beam, and see `ARC`
+        const THREADS: usize = 5;
+        const ARCS: usize = 6;
         const COUNTS: usize = 7;
         const ITEMS: usize = 8;
         const BOXES: usize = 9;
@@ -122,9 +124,10 @@ impl Kernel for Pairs {
         let period = params.period.map(|p| L::Scalar::from_i32(p) * constant(QUANTUM));
         let reach = constant(f64::from(2.0 * params.thread_radius + params.skin));
         let slots = params.beam_slots as usize;
-        let mut found = Vec::with_capacity(4 * slots);
         for beam in items {
-            found.clear();
+            // in ascending order
+            let mut found = [EMPTY; MOST_PAIRS];
+            let mut count = 0;
             let middle = &boxes[BOX * (params.slabs as usize + beam)..][..BOX];
             let (_, along) = scene.vector(beam);
             let (start, _) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, scene.ends[2 * beam] as usize);
@@ -163,17 +166,27 @@ impl Kernel for Pairs {
                         let (_, direction) = scene.vector(other);
                         let (s, t) = closest_points(along, direction, apart);
                         let offset = sub(scale(along, s), fma(direction, t, apart));
-                        let key = key(other, image);
-                        if norm(offset) < reach && !found.contains(&key) {
-                            found.push(key);
+                        if !(norm(offset) < reach) {
+                            continue;
                         }
+                        let key = key(other, image);
+                        let place = found[..count].partition_point(|known| *known < key);
+                        if found[..count].get(place) == Some(&key) {
+                            continue;
+                        }
+                        if count == MOST_PAIRS {
+                            flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
+                            continue;
+                        }
+                        found.copy_within(place..count, place + 1);
+                        found[place] = key;
+                        count += 1;
                     }
                 }
             }
-            found.sort_unstable();
-            if found.len() > slots {
+            if count > slots {
                 flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
-                found.truncate(slots);
+                count = slots;
             }
             let (keys, states) = (keys.item(0, beam), states.item(0, beam));
             let old: Vec<(u32, [L::Scalar; STATE])> = keys
@@ -183,7 +196,7 @@ impl Kernel for Pairs {
                 .map(|(key, s)| (*key, [s[0], s[1], s[2], s[3]]))
                 .collect();
             for (slot, (key, state)) in keys.iter_mut().zip(states.chunks_exact_mut(STATE)).enumerate() {
-                *key = found.get(slot).copied().unwrap_or(EMPTY);
+                *key = found[..count].get(slot).copied().unwrap_or(EMPTY);
                 let known = old.iter().find(|(old, _)| *key != EMPTY && old == key);
                 state.copy_from_slice(&known.map_or([constant(0.0); STATE], |(_, state)| *state));
             }
@@ -196,8 +209,8 @@ impl Kernel for Force {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        const VELOCITY: usize = 7;
-        const MASS: usize = 8;
+        const VELOCITY: usize = 5;
+        const MASS: usize = 6;
         let params: Params = io.params();
         let real = |x: f32| L::Scalar::from_f64(f64::from(x));
         let constant = L::Scalar::from_f64;
@@ -205,10 +218,10 @@ impl Kernel for Force {
         let scene = Scene::new(io, params.period);
         let velocity = Field::new(io, VELOCITY);
         let mass = io.scalars(MASS);
-        let mut keys = io.own::<u32>(9);
-        let mut states = io.own::<L::Scalar>(10);
-        let mut sums = io.own::<L::Scalar>(11);
-        let (forces, stiffness, flags) = (io.atomics(12), io.atomics(13), io.atomic_uints(14));
+        let mut keys = io.own::<u32>(7);
+        let mut states = io.own::<L::Scalar>(8);
+        let mut sums = io.own::<L::Scalar>(9);
+        let (forces, stiffness, flags) = (io.atomics(10), io.atomics(11), io.atomic_uints(12));
         let radius = real(params.thread_radius) * io.row.radius;
         let elapsed = io.row.dt_mid + io.row.dt_mid - io.row.dt;
         for beam in items {

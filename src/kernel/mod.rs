@@ -2,6 +2,7 @@
 //! A kernel is written once over [`lane::Lane`] and runs as f32 or f64, one item or a whole register at a time.
 
 pub mod buffer;
+pub mod exact;
 pub mod lane;
 pub mod math;
 pub mod node;

@@ -24,7 +24,7 @@ static SHADERS: Dir = include_dir!("$CARGO_MANIFEST_DIR/shaders");
 pub const WORKGROUP: usize = 64;
 
 /// Where the twin of a kernel is and how it is built.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Shader {
     /// File under `shaders/`, without its suffix.
     pub file: &'static str,
@@ -126,7 +126,7 @@ impl Composer {
         }
         self.included.push(path);
         let file = SHADERS.get_file(format!("{path}.wgsl")).and_then(|f| f.contents_utf8());
-        let file = file.ok_or_else(|| Error::Shader(format!("there is no shaders/{path}.wgsl")))?;
+        let file = file.ok_or_else(|| Error::Shader(format!("shaders/{path}.wgsl: there is no such file")))?;
         // whether the lines of each open #if are kept
         let mut kept: Vec<bool> = Vec::new();
         for (number, line) in file.lines().enumerate() {

@@ -97,7 +97,7 @@ pub struct Buffers {
     pub reaction_work: Option<Buffer>,
 }
 
-/// Sizes of contact's tables, which grow when they overflow.
+/// Sizes of contact's tables, which grow when they overflow: slots up to 16, those of beams up to [`thread_contact::MOST_PAIRS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacity {
     pub cell: usize,
@@ -598,8 +598,8 @@ impl ContactScene<'_> {
             let state =
                 b.add("beam pair friction", Kind::Scalar, thread_contact::STATE * slots * beams, true, Initial::Zero);
             let sums = b.scratch("beam pair sums", penalty::SUMS * beams);
-            let common = [&[of, arcs, self.ends, self.beams][..], &place].concat();
-            let reads = [&common[..], &[counts, lists, boxes]].concat();
+            let common = [&[self.ends, self.beams][..], &place].concat();
+            let reads = [&common[..], &[of, arcs, counts, lists, boxes]].concat();
             let keys_own = (keys, own(1, slots));
             let state_own = (state, own(1, thread_contact::STATE * slots));
             let writes = [keys_own, state_own, status];

@@ -1,14 +1,17 @@
 //! Case in, results out: owns the plan, the backend, the schedule, the measures and the outputs of one run.
 
 mod check;
+mod devices;
 mod mesh;
 mod picture;
 mod summary;
 
 pub use check::check;
+pub use devices::devices;
 pub use mesh::mesh;
 pub use picture::picture;
 
+use crate::backend::gpu::{self, Device};
 use crate::case::Case;
 use crate::case::domain::Domain;
 use crate::case::read::Loaded;
@@ -40,10 +43,34 @@ pub struct Options {
     pub precision: Option<Precision>,
     /// Number of threads; `None` for all cores.
     pub threads: Option<usize>,
+    /// What the scene runs on.
+    pub machine: Machine,
+    /// Part of the name of the adapter; empty for any.
+    pub adapter: String,
     /// Move earlier results in the folder aside.
     pub force: bool,
     /// No progress.
     pub quiet: bool,
+}
+
+/// What a scene runs on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Machine {
+    /// A discrete GPU if there is one and the scene is in f32, else the CPU.
+    Auto,
+    Cpu,
+    Gpu,
+}
+
+/// The machine that was asked for, ready to make backends.
+fn make(precision: Precision, options: &Options) -> Result<Make> {
+    let wanted = match options.machine {
+        Machine::Cpu => false,
+        Machine::Gpu => true,
+        Machine::Auto => precision == Precision::F32 && gpu::devices().first().is_some_and(|d| d.is_discrete),
+    };
+    let device = if wanted { Some(Device::open(&options.adapter)?) } else { None };
+    Ok(Make { precision, threads: options.threads.unwrap_or(0), device, ..Make::default() })
 }
 
 /// What a run found, in ten lines.
@@ -92,9 +119,7 @@ pub fn run(loaded: &Loaded, options: &Options) -> Result<Outcome> {
     if let Some(precision) = options.precision {
         loaded.case.integration.precision = precision;
     }
-    let make =
-        Make { precision: loaded.case.integration.precision, threads: options.threads.unwrap_or(0), ..Make::default() };
-    let simulation = simulation(&loaded, make)?;
+    let simulation = simulation(&loaded, make(loaded.case.integration.precision, options)?)?;
     directory::prepare(&options.output, options.force)?;
     write_case(&loaded.case, &options.output)?;
     let stopped = Arc::new(AtomicBool::new(false));
@@ -242,7 +267,9 @@ impl<'a> Run<'a> {
                 }
             }
             if !matches!(step, Step::Shear { .. } | Step::Move { .. }) && self.yarns.is_some() {
-                let yarns = yarns::measure(&self.simulation.mesh, &self.simulation.frame())?;
+                let frame = self.simulation.frame();
+                self.simulation.alive()?;
+                let yarns = yarns::measure(&self.simulation.mesh, &frame)?;
                 self.settled = Some(yarns::ply(&yarns, Ply::Warp));
                 self.settled_weft = Some(yarns::ply(&yarns, Ply::Weft));
             }
@@ -298,6 +325,7 @@ impl<'a> Run<'a> {
         let reaction = libm::sqrt(reaction.iter().map(|f| f * f).sum());
         let (e, h) = (*s.energies(), *s.health());
         let motion = s.load().motion;
+        s.alive()?;
         self.worst_balance = self.worst_balance.max(h.balance.abs());
         self.dt_range = [self.dt_range[0].min(s.dt()), self.dt_range[1].max(s.dt())];
         for (largest, now) in self.largest_added.iter_mut().zip(h.added_mass) {
@@ -334,7 +362,9 @@ impl<'a> Run<'a> {
         let numbers: Vec<f64> = [&[time, degrees][..], &counts, &h.penetration, &h.added_mass, &[h.dt_limit]].concat();
         self.contacts.numbers(&numbers)?;
         if let Some([table, each]) = &mut self.yarns {
-            let yarns = yarns::measure(&s.mesh, &s.frame())?;
+            let frame = s.frame();
+            s.alive()?;
+            let yarns = yarns::measure(&s.mesh, &frame)?;
             let plies = [Ply::Warp, Ply::Weft].map(|ply| yarns::ply(&yarns, ply));
             let means = plies.map(|p| [p.width.mean, p.thickness.mean, p.gap.mean]);
             let spreads = plies.map(|p| [p.width.std, p.thickness.std, p.gap.std]);
@@ -357,7 +387,9 @@ impl<'a> Run<'a> {
             }
         }
         if let Some(table) = &mut self.stitches {
-            let t = stitches::measure(&s.mesh, &s.tensions())?;
+            let tensions = s.tensions();
+            s.alive()?;
+            let t = stitches::measure(&s.mesh, &tensions)?;
             table.numbers(&[
                 time,
                 degrees,
@@ -378,6 +410,7 @@ impl<'a> Run<'a> {
     fn write_frame(&mut self, name: &str) -> Result<()> {
         let s = &self.simulation;
         let frame = s.frame();
+        s.alive()?;
         let dir = &self.options.output;
         let file = format!("frames/{:04}-{name}.vtu", self.frames.len());
         vtu::write(&s.mesh, &frame, &dir.join(&file))?;

@@ -18,6 +18,8 @@ impl Run<'_> {
             let mass = sum(&s.model.true_mass[range.clone()]);
             if mass > 0.0 { sum(&s.model.mass[range]) / mass - 1.0 } else { 0.0 }
         };
+        let hash = s.state_hash();
+        let hash = s.alive().ok().map(|()| format!("{hash:016x}"));
         let summary = json!({
             "verdict": verdict,
             "case": self.loaded.case,
@@ -43,7 +45,7 @@ impl Run<'_> {
             "worst_energy_balance": self.worst_balance,
             "worst_kinetic_over_internal_in_shear": self.worst_kinetic,
             "energies_mj": e.columns().into_iter().map(|(name, value)| (name.to_owned(), json!(value))).collect::<serde_json::Map<_, _>>(),
-            "state_hash": format!("{:016x}", s.state_hash()),
+            "state_hash": hash,
             "frames": self.frames.iter().map(|(time, file)| json!({"time_s": time, "file": file})).collect::<Vec<_>>(),
         });
         let path = self.options.output.join("summary.json");

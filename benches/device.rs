@@ -1,0 +1,131 @@
+//! What a step costs on a GPU: microseconds a step, hexahedra a second, the time of each stage by the device's own clock, the
+//! share of the step between dispatches, and how far the step is from what the device can do at best. One scene a run:
+//! `cargo bench --bench device -- WARPS WEFTS` (2 4: the 10 × 10 mm cell; 6 12: 30 × 30 mm; 20 40: 100 × 100 mm).
+
+use naga::{Expression, MathFunction, Statement, TypeInner};
+use std::collections::HashSet;
+use std::path::Path;
+use std::time::Instant;
+use tricot::backend::gpu::Device;
+use tricot::case::read::read;
+use tricot::kernel::shader::Text;
+use tricot::kernel::stage::Stage;
+use tricot::run::simulation;
+use tricot::simulate::{Make, Simulation};
+
+/// A quick pre-tension, so that contact is as busy as in most of a run, and where timing starts, s.
+const QUICK: [&str; 2] = ["steps.0.pretension.time_s=1e-4", "steps.1.hold.time_s=5e-5"];
+const START: f64 = 1.6e-4;
+/// Steps that are timed.
+const STEPS: u64 = 1024;
+
+fn main() {
+    let numbers: Vec<usize> = std::env::args().filter_map(|a| a.parse().ok()).collect();
+    let [warps, wefts] = if let [warps, wefts] = numbers[..] { [warps, wefts] } else { [2, 4] };
+    let device = match Device::open("") {
+        Ok(device) => device,
+        Err(error) => return println!("{error}"),
+    };
+    let sets = [format!("domain.cell.warps={warps}"), format!("domain.cell.wefts={wefts}")];
+    let sets: Vec<String> = QUICK.map(String::from).into_iter().chain(sets).collect();
+    let loaded = read(Path::new("cases/unit_cell_shear.json"), &sets).unwrap_or_else(|e| panic!("{e}"));
+    let make = Make { device: Some(device.clone()), ..Make::default() };
+    let mut sheet = simulation(&loaded, make).unwrap_or_else(|e| panic!("{e}"));
+    let hexes = sheet.mesh.hexes();
+    println!(
+        "{} hexes, {} beams, {} nodes; {}",
+        hexes,
+        sheet.mesh.beams(),
+        sheet.mesh.nodes.len(),
+        sheet.backend().describe()
+    );
+    go(&mut sheet, START);
+    let (before, timed, started) = (sheet.step(), sheet.backend().timings(), Instant::now());
+    let until = sheet.time() + STEPS as f64 * sheet.dt();
+    go(&mut sheet, until);
+    let (steps, wall) = (sheet.step() - before, started.elapsed().as_secs_f64());
+    let step = wall / steps as f64;
+    println!("{:.1} µs a step, {:.2} million hexes a second, {steps} steps", 1e6 * step, 1e-6 * hexes as f64 / step);
+
+    let rates = device.rates();
+    println!("device at best: {:.0} GB/s, {:.0} GFLOP/s", 1e-9 * rates.bytes, 1e-9 * rates.operations);
+    println!("{:16} {:>12} {:>12} {:>12}", "stage", "µs a step", "floor, µs", "of floor");
+    let plan = sheet.model.plan.clone();
+    let mut sum = 0.0;
+    for (name, time) in sheet.backend().timings() {
+        let old = timed.iter().find(|(n, _)| *n == name).map_or(0.0, |(_, t)| *t);
+        let spent = (time - old) / steps as f64;
+        sum += spent;
+        let stages = plan.step.iter().filter(|s| s.name == name && s.count > 0);
+        let floor: f64 = stages.map(|s| floor(&sheet, s, rates.bytes, rates.operations)).sum();
+        let share = if floor > 0.0 { format!("{:.0} %", 100.0 * floor / spent) } else { String::new() };
+        println!("{name:16} {:12.2} {:12.2} {share:>12}", 1e6 * spent, 1e6 * floor);
+    }
+    println!("between dispatches: {:.0} % of the step", 100.0 * (1.0 - sum / step));
+}
+
+fn go(sheet: &mut Simulation, until: f64) {
+    sheet.advance(until, |_| false).unwrap_or_else(|e| panic!("{e}"));
+}
+
+/// The least time of a stage, s: all its buffers moved once, or its operations at the best rate, whichever takes longer.
+fn floor(sheet: &Simulation, stage: &Stage, bytes_per_s: f64, operations_per_s: f64) -> f64 {
+    let buffers: HashSet<usize> = stage.reads.iter().chain(stage.writes.iter().map(|(b, _)| b)).map(|b| b.0).collect();
+    let written: usize = stage.writes.iter().map(|(b, _)| sheet.model.plan.buffers[b.0].len).sum();
+    let bytes = 4 * (buffers.iter().map(|b| sheet.model.plan.buffers[*b].len).sum::<usize>() + written);
+    let invocations = stage.count * stage.kernel.shader.invocations;
+    let operations = operations(stage) * invocations as f64;
+    (bytes as f64 / bytes_per_s).max(operations / operations_per_s)
+}
+
+/// Operations on f32 that one invocation of a stage does, if its shader has no loops; else 0: loops end by data.
+fn operations(stage: &Stage) -> f64 {
+    let text = Text::of(stage).unwrap_or_else(|e| panic!("{e}"));
+    let (module, info) = text.module().unwrap_or_else(|e| panic!("{e}"));
+    let entry =
+        module.entry_points.iter().position(|e| e.name == stage.kernel.shader.entry).expect("checked by a test");
+    count(&module, &module.entry_points[entry].function, info.get_entry_point(entry), &info).unwrap_or(0.0)
+}
+
+fn count(
+    module: &naga::Module,
+    function: &naga::Function,
+    info: &naga::valid::FunctionInfo,
+    all: &naga::valid::ModuleInfo,
+) -> Option<f64> {
+    let mut sum = 0.0;
+    for (handle, expression) in function.expressions.iter() {
+        let inner = info[handle].ty.inner_with(&module.types);
+        let size = match inner {
+            TypeInner::Scalar(s) if s.kind == naga::ScalarKind::Float => 1.0,
+            TypeInner::Vector { size, scalar } if scalar.kind == naga::ScalarKind::Float => f64::from(*size as u8),
+            TypeInner::Matrix { columns, rows, .. } => f64::from(*columns as u8) * f64::from(*rows as u8),
+            _ => continue,
+        };
+        sum += match expression {
+            Expression::Binary { .. } => size,
+            Expression::Math { fun: MathFunction::Fma, .. } => 2.0 * size,
+            Expression::Math { fun: MathFunction::Dot, .. } => 5.0,
+            Expression::Math { fun: MathFunction::Cross, .. } => 9.0,
+            Expression::Math { .. } => size,
+            _ => 0.0,
+        };
+    }
+    for statement in &function.body {
+        sum += called(module, statement, all)?;
+    }
+    Some(sum)
+}
+
+/// Operations of the functions that a statement calls; `None` for loops.
+fn called(module: &naga::Module, statement: &Statement, all: &naga::valid::ModuleInfo) -> Option<f64> {
+    let block = |block: &naga::Block| block.iter().map(|s| called(module, s, all)).sum::<Option<f64>>();
+    match statement {
+        Statement::Call { function, .. } => count(module, &module.functions[*function], &all[*function], all),
+        Statement::Block(inner) => block(inner),
+        Statement::If { accept, reject, .. } => Some(block(accept)? + block(reject)?),
+        Statement::Switch { cases, .. } => cases.iter().map(|case| block(&case.body)).sum(),
+        Statement::Loop { .. } => None,
+        _ => Some(0.0),
+    }
+}

@@ -1,0 +1,229 @@
+// Candidates of each slave node: for every body and image within reach, the face that is closest.
+
+#define STATUS
+#define BODIES
+#include "contact/grid"
+#include "contact/penalty"
+
+#if ROOT
+@group(1) @binding(0) var<storage, read> slaves: array<u32>;
+@group(1) @binding(1) var<storage, read> values: array<f32>;
+@group(1) @binding(2) var<storage, read> slabs: array<u32>;
+@group(1) @binding(3) var<storage, read> bodies: array<u32>;
+@group(1) @binding(4) var<storage, read> ring_lines: array<u32>;
+@group(1) @binding(5) var<storage, read> reference: array<i32>;
+@group(1) @binding(6) var<storage, read> quanta: array<i32>;
+@group(1) @binding(7) var<storage, read> remainder: array<f32>;
+@group(1) @binding(8) var<storage, read> counts: array<u32>;
+@group(1) @binding(9) var<storage, read> lists: array<u32>;
+@group(1) @binding(10) var<storage, read> boxes: array<f32>;
+@group(1) @binding(11) var<storage, read_write> keys: array<u32>;
+@group(1) @binding(12) var<storage, read_write> states: array<f32>;
+@group(1) @binding(13) var<storage, read_write> status: array<atomic<u32>>;
+
+// Bodies that one slave can be near to before the search gives up.
+const MOST: u32 = 16u;
+// A face behind which the slave lies must be closer than one in front by this, mm.
+const CLEARLY: f32 = 0.01;
+// Farther than anything, mm.
+const FAR: f32 = 1e9;
+
+// A face and its distance, mm.
+struct Near {
+    distance: f32,
+    place: Place,
+}
+
+// The best faces of one body found so far.
+struct Best {
+    key: u32,
+    in_front: Near,
+    behind: Near,
+}
+
+// A slot: key, ring position, slice, state.
+struct Slot {
+    key: u32,
+    ring: u32,
+    slice: u32,
+    state: vec4<f32>,
+}
+
+// The nearer of two faces; of equally near ones that with the smaller number, so that the order of visits does not matter.
+fn nearer(a: Near, b: Near) -> Near {
+    let smaller = b.place.slice < a.place.slice || (b.place.slice == a.place.slice && b.place.ring < a.place.ring);
+    if b.distance < a.distance || (b.distance == a.distance && smaller) {
+        return b;
+    }
+    return a;
+}
+
+// The ends of the edge between two faces of a slice, seen from the slave.
+struct Edge {
+    low: vec3<f32>,
+    high: vec3<f32>,
+}
+
+fn across(slave: u32, body: u32, image: vec2<i32>, ring: i32, slice: i32) -> Edge {
+    return Edge(
+        from_slave(slave, node(body, image, Place(ring, slice))).current,
+        from_slave(slave, node(body, image, Place(ring, slice + 1))).current,
+    );
+}
+
+// The best faces of a slab, whose first one is at `first` around the ring.
+fn best_of(slave: u32, body: u32, image: vec2<i32>, slice: i32, first: i32, is_thread: bool, reach: f32) -> Best {
+    let nowhere = Near(FAR, Place(0, 0));
+    var best = Best(key(body, image), nowhere, nowhere);
+    var here = across(slave, body, image, first, slice);
+    for (var ring = first; ring < min(first + SLAB_FACES, ring_of(body)); ring++) {
+        let next = across(slave, body, image, ring + 1, slice);
+        let corners = array<vec3<f32>, 4>(here.low, here.high, next.high, next.low);
+        here = next;
+        let middle = ((corners[0] + corners[1]) + (corners[2] + corners[3])) * 0.25;
+        let spread = 0.5 * max(norm(corners[2] - corners[0]), norm(corners[3] - corners[1]));
+        if norm(middle) > reach + spread * 1.1 {
+            continue;
+        }
+        let point = closest(corners);
+        if point.distance > reach {
+            continue;
+        }
+        let face = Near(point.distance, Place(ring, slice));
+        if height(point) >= 0.0 || is_thread && !point.interior {
+            best.in_front = nearer(best.in_front, face);
+        } else if normal_and_distance(point, is_thread).faces {
+            best.behind = nearer(best.behind, face);
+        }
+    }
+    return best;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn candidates(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let item = invocation(workgroup, workgroups, local);
+    if item >= items.count {
+        return;
+    }
+    let back = inverse();
+    let stretched = stretch(back);
+    let slave = slaves[SLAVE * item];
+    let own = slaves[SLAVE * item + 1u];
+    let is_thread = own == EMPTY;
+    let reach = values[SLAVE_VALUES * item + 1u] + params.skin;
+    let position = absolute(back, slave);
+    let period = vec2<f32>(params.period) * QUANTUM;
+    var found: array<Best, MOST>;
+    var count = 0u;
+    if is_finite(position.x) && is_finite(position.y) && is_finite(position.z) {
+        let cell = cell_index(cells(0u, position.x, position.x).x, cells(1u, position.y, position.y).x);
+        let listed = min(counts[cell], params.capacity);
+        for (var i = 0u; i < listed; i++) {
+            let near = lists[cell * params.capacity + i];
+            if near >= params.slabs {
+                continue;
+            }
+            let body = slabs[SLAB * near];
+            let middle = vec2<f32>(boxes[BOX * near], boxes[BOX * near + 1u]);
+            let low = boxes[BOX * near + 2u];
+            let high = boxes[BOX * near + 3u];
+            if body == own || position.z < low - reach || position.z > high + reach {
+                continue;
+            }
+            var image = vec2<i32>(0);
+            if params.period.x != 0 {
+                image.x = to_i32((position.x - middle.x) / period.x);
+            }
+            if params.period.y != 0 {
+                image.y = to_i32((position.y - middle.y) / period.y);
+            }
+            let from_middle = abs(position.xy - middle - vec2<f32>(image) * period);
+            let room = vec2<f32>(boxes[BOX * near + 4u], boxes[BOX * near + 5u]) + reach * stretched;
+            if any(from_middle > room) {
+                continue;
+            }
+            // a closed yarn goes on through its own images: count its slices on instead
+            let turns = image.x * wrap_of(body).x + image.y * wrap_of(body).y;
+            let lateral = image - turns * wrap_of(body);
+            let slice = i32(slabs[SLAB * near + 1u]) + turns * slices_of(body);
+            let first = i32(slabs[SLAB * near + 2u]);
+            let best = best_of(slave, body, lateral, slice, first, is_thread, reach);
+            if best.in_front.distance == FAR && best.behind.distance == FAR {
+                continue;
+            }
+            var known = 0u;
+            while known < count && found[known].key != best.key {
+                known++;
+            }
+            if known < count {
+                found[known].in_front = nearer(found[known].in_front, best.in_front);
+                found[known].behind = nearer(found[known].behind, best.behind);
+            } else if count < MOST {
+                found[count] = best;
+                count++;
+            } else {
+                atomicOr(&status[FLAGS], SLOTS_FULL);
+            }
+        }
+    } else {
+        atomicOr(&status[FLAGS], NOT_FINITE);
+    }
+    // sorted by key
+    for (var i = 1u; i < count; i++) {
+        let best = found[i];
+        var to = i;
+        while to > 0u && found[to - 1u].key > best.key {
+            found[to] = found[to - 1u];
+            to--;
+        }
+        found[to] = best;
+    }
+    if count > params.slots {
+        atomicOr(&status[FLAGS], SLOTS_FULL);
+    }
+    // new candidates go into the slots; known ones keep their friction, and their face while they touch
+    let first_slot = params.slots * item;
+    var old: array<Slot, MOST>;
+    let known_slots = min(params.slots, MOST);
+    for (var slot = 0u; slot < known_slots; slot++) {
+        let k = SLOT_KEYS * (first_slot + slot);
+        let s = SLOT_STATE * (first_slot + slot);
+        let state = vec4<f32>(states[s], states[s + 1u], states[s + 2u], states[s + 3u]);
+        old[slot] = Slot(keys[k], keys[k + 1u], keys[k + 2u], state);
+    }
+    for (var slot = 0u; slot < params.slots; slot++) {
+        var now = Slot(EMPTY, EMPTY, EMPTY, vec4<f32>(0.0));
+        if slot < count {
+            let best = found[slot];
+            var place = best.in_front.place;
+            if best.behind.distance + CLEARLY < best.in_front.distance {
+                place = best.behind.place;
+            }
+            now = Slot(best.key, u32(place.ring), u32(place.slice), vec4<f32>(0.0));
+            for (var i = 0u; i < known_slots; i++) {
+                if old[i].key == best.key {
+                    now.state = old[i].state;
+                    if old[i].state.w > 0.0 {
+                        now.ring = old[i].ring;
+                        now.slice = old[i].slice;
+                    }
+                    break;
+                }
+            }
+        }
+        let k = SLOT_KEYS * (first_slot + slot);
+        let s = SLOT_STATE * (first_slot + slot);
+        keys[k] = now.key;
+        keys[k + 1u] = now.ring;
+        keys[k + 2u] = now.slice;
+        states[s] = now.state.x;
+        states[s + 1u] = now.state.y;
+        states[s + 2u] = now.state.z;
+        states[s + 3u] = now.state.w;
+    }
+}
+#endif

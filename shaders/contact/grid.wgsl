@@ -1,0 +1,176 @@
+// The grid of the contact search: slabs of yarns and beams, each in every cell that its box touches.
+
+#include "kernel/stage"
+#if clear
+#if ROOT
+@group(1) @binding(0) var<storage, read_write> counts: array<u32>;
+
+@compute @workgroup_size(WORKGROUP)
+fn clear(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let cell = invocation(workgroup, workgroups, local);
+    if cell >= items.count {
+        return;
+    }
+    counts[cell] = 0u;
+}
+#endif
+#else
+#if fill
+#define STATUS
+#define BODIES
+#endif
+#include "contact/face"
+#if fill
+#include "elements/beam2"
+#endif
+
+// Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm, half sizes in the plane, mm (2).
+const BOX: u32 = 6u;
+// Integers of a slab: body, slice, first face around the ring.
+const SLAB: u32 = 3u;
+// Faces of a slab at most.
+const SLAB_FACES: i32 = 8;
+// More than rounding moves a place in the plane, mm: an item must not be in too few cells.
+const ROUNDING: f32 = 1e-4;
+
+// The in-plane inverse of F̄, and a vector in the pulled-back plane.
+struct Inverse {
+    x: vec2<f32>,
+    y: vec2<f32>,
+}
+
+fn inverse() -> Inverse {
+    let a = 1.0 + row.gradient_xx;
+    let b = row.gradient_xy;
+    let c = row.gradient_yx;
+    let d = 1.0 + row.gradient_yy;
+    let scale = 1.0 / (a * d - b * c);
+    return Inverse(vec2<f32>(d * scale, -(b * scale)), vec2<f32>(-(c * scale), a * scale));
+}
+
+fn pull_back(back: Inverse, v: vec3<f32>) -> vec2<f32> {
+    return vec2<f32>(dot(back.x, v.xy), dot(back.y, v.xy));
+}
+
+// How far a distance in space reaches along the axes of the pulled-back plane.
+fn stretch(back: Inverse) -> vec2<f32> {
+    return vec2<f32>(sqrt(dot(back.x, back.x)), sqrt(dot(back.y, back.y)));
+}
+
+// Where a node is: pulled-back plane and height, mm. For the grid only; contact works with differences.
+fn absolute(back: Inverse, node: u32) -> vec3<f32> {
+    let plane = arrayLength(&remainder) / 3u;
+    let y = node + plane;
+    let z = y + plane;
+    let q = vec3<f32>(vec3<i32>(quanta[node], quanta[y], quanta[z])) * QUANTUM;
+    let w = q + vec3<f32>(remainder[node], remainder[y], remainder[z]);
+    let at_rest = vec3<f32>(vec3<i32>(reference[node], reference[y], reference[z])) * QUANTUM;
+    return at_rest + vec3<f32>(pull_back(back, w), w.z);
+}
+
+// First and last cell along one axis for an interval of the pulled-back plane; the last may lie behind the first by whole periods.
+fn cells(axis: u32, low: f32, high: f32) -> vec2<i32> {
+    let x = (vec2<f32>(low, high) - params.origin[axis]) / params.cell[axis];
+    let cell = vec2<i32>(floor(clamp(x, vec2<f32>(-1e6), vec2<f32>(1e6))));
+    let last = i32(params.cells[axis]) - 1;
+    if params.period[axis] != 0 {
+        return vec2<i32>(cell.x, min(cell.y, cell.x + last));
+    }
+    return clamp(cell, vec2<i32>(0), vec2<i32>(last));
+}
+
+// Number of a cell.
+fn cell_index(x: i32, y: i32) -> u32 {
+    let n = vec2<i32>(params.cells);
+    return u32(rem_euclid(y, n.y) * n.x + rem_euclid(x, n.x));
+}
+
+#if ROOT
+@group(1) @binding(0) var<storage, read> slabs: array<u32>;
+@group(1) @binding(1) var<storage, read> bodies: array<u32>;
+@group(1) @binding(2) var<storage, read> ring_lines: array<u32>;
+@group(1) @binding(3) var<storage, read> reference: array<i32>;
+@group(1) @binding(4) var<storage, read> quanta: array<i32>;
+@group(1) @binding(5) var<storage, read> remainder: array<f32>;
+@group(1) @binding(6) var<storage, read> ends: array<u32>;
+@group(1) @binding(7) var<storage, read> beams: array<f32>;
+@group(1) @binding(8) var<storage, read_write> counts: array<atomic<u32>>;
+@group(1) @binding(9) var<storage, read_write> lists: array<u32>;
+@group(1) @binding(10) var<storage, read_write> boxes: array<f32>;
+@group(1) @binding(11) var<storage, read_write> status: array<atomic<u32>>;
+
+// The box of an item, from its first node.
+struct Bounds {
+    low: vec3<f32>,
+    high: vec3<f32>,
+}
+
+fn grow(bounds: Bounds, back: Inverse, v: vec3<f32>) -> Bounds {
+    let x = vec3<f32>(pull_back(back, v), v.z);
+    return Bounds(min(bounds.low, x), max(bounds.high, x));
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn fill(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let item = invocation(workgroup, workgroups, local);
+    if item >= items.count {
+        return;
+    }
+    let back = inverse();
+    var origin: u32;
+    var reach: f32;
+    var bounds = Bounds(vec3<f32>(0.0), vec3<f32>(0.0));
+    if item < params.slabs {
+        let body = slabs[SLAB * item];
+        let slice = i32(slabs[SLAB * item + 1u]);
+        let first = i32(slabs[SLAB * item + 2u]);
+        origin = node(body, vec2<i32>(0), Place(first, slice)).node;
+        let last = min(first + SLAB_FACES, ring_of(body));
+        for (var ring = first; ring <= last; ring++) {
+            for (var end = slice; end <= slice + 1; end++) {
+                let seen = node(body, vec2<i32>(0), Place(ring, end));
+                bounds = grow(bounds, back, from_slave(origin, seen).current);
+            }
+        }
+        reach = params.thread_radius + params.skin;
+    } else {
+        let beam = item - params.slabs;
+        origin = ends[2u * beam];
+        let along = vector(beam);
+        bounds = grow(bounds, back, along.reference + along.change);
+        reach = 2.0 * params.thread_radius + params.skin;
+    }
+    let base = absolute(back, origin);
+    let low = bounds.low;
+    let high = bounds.high;
+    boxes[BOX * item] = base.x + 0.5 * (low.x + high.x);
+    boxes[BOX * item + 1u] = base.y + 0.5 * (low.y + high.y);
+    boxes[BOX * item + 2u] = base.z + low.z;
+    boxes[BOX * item + 3u] = base.z + high.z;
+    boxes[BOX * item + 4u] = 0.5 * (high.x - low.x);
+    boxes[BOX * item + 5u] = 0.5 * (high.y - low.y);
+    let room = reach * stretch(back) + ROUNDING;
+    let xs = cells(0u, base.x + low.x - room.x, base.x + high.x + room.x);
+    let ys = cells(1u, base.y + low.y - room.y, base.y + high.y + room.y);
+    for (var y = ys.x; y <= ys.y; y++) {
+        for (var x = xs.x; x <= xs.y; x++) {
+            let cell = cell_index(x, y);
+            let place = atomicAdd(&counts[cell], 1u);
+            if place < params.capacity {
+                lists[cell * params.capacity + place] = item;
+            } else {
+                atomicOr(&status[FLAGS], CELL_FULL);
+            }
+        }
+    }
+}
+#endif
+#endif

@@ -1,0 +1,235 @@
+//! Adapters, the device that a run works on, its limits and its faults.
+
+use super::pipeline::Pipeline;
+use crate::error::{Error, Result};
+use crate::kernel::buffer::Description;
+use crate::kernel::shader::Text;
+use crate::kernel::stage::Stage;
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Storage buffers that the widest stage binds.
+const STORAGE_BUFFERS: u32 = 16;
+
+/// An adapter, as `tricot devices` lists it.
+#[derive(Debug, Clone)]
+pub struct Listed {
+    pub name: String,
+    /// Graphics interface: Vulkan, Metal or Dx12.
+    pub interface: String,
+    pub driver: String,
+    /// Discrete GPU, integrated GPU, virtual GPU, or software.
+    pub kind: &'static str,
+    /// A GPU with memory of its own.
+    pub is_discrete: bool,
+    /// Largest buffer that a stage can bind, bytes.
+    pub binding_bytes: u64,
+    /// Largest buffer, bytes.
+    pub buffer_bytes: u64,
+    /// Storage buffers that a stage can bind.
+    pub storage_buffers: u32,
+    /// Memory that a workgroup shares, bytes.
+    pub workgroup_bytes: u32,
+    /// Whether stages can be timed on the device.
+    pub has_timestamps: bool,
+}
+
+/// An open device.
+pub struct Device {
+    pub(super) device: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
+    listed: Listed,
+    limits: wgpu::Limits,
+    /// Layout of the row of schedule data, which all stages share.
+    pub(super) row_layout: wgpu::BindGroupLayout,
+    /// Compiled stages, by text and entry point.
+    pipelines: Mutex<HashMap<(String, &'static str), Arc<Pipeline>>>,
+    fault: Arc<Mutex<Option<String>>>,
+}
+
+impl fmt::Debug for Device {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.listed.name)
+    }
+}
+
+fn instance() -> wgpu::Instance {
+    wgpu::Instance::new(wgpu::InstanceDescriptor {
+        backends: wgpu::Backends::PRIMARY,
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    })
+}
+
+fn adapters() -> Vec<wgpu::Adapter> {
+    let mut all = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::PRIMARY));
+    all.sort_by_key(|adapter| match adapter.get_info().device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::VirtualGpu => 1,
+        wgpu::DeviceType::IntegratedGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    });
+    all
+}
+
+fn list(adapter: &wgpu::Adapter) -> Listed {
+    let (info, limits) = (adapter.get_info(), adapter.limits());
+    Listed {
+        name: info.name,
+        interface: info.backend.to_string(),
+        driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+        kind: match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+            wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+            wgpu::DeviceType::VirtualGpu => "virtual GPU",
+            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::Other => "other",
+        },
+        is_discrete: info.device_type == wgpu::DeviceType::DiscreteGpu,
+        binding_bytes: limits.max_storage_buffer_binding_size,
+        buffer_bytes: limits.max_buffer_size,
+        storage_buffers: limits.max_storage_buffers_per_shader_stage,
+        workgroup_bytes: limits.max_compute_workgroup_storage_size,
+        has_timestamps: adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY),
+    }
+}
+
+/// All adapters, the one that a run would take first.
+pub fn devices() -> Vec<Listed> {
+    adapters().iter().map(list).collect()
+}
+
+/// Keeps the first fault.
+fn note(fault: &Mutex<Option<String>>, what: String) {
+    fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(what);
+}
+
+impl Device {
+    /// Opens the first adapter whose name contains `name` (any if empty; hardware before software).
+    ///
+    /// # Errors
+    /// No such adapter, or one that cannot do what the stages need.
+    pub fn open(name: &str) -> Result<Arc<Self>> {
+        let all = adapters();
+        let known = || all.iter().map(|a| format!("`{}`", a.get_info().name)).collect::<Vec<_>>().join(", ");
+        if all.is_empty() {
+            return Err(Error::Unsupported(
+                "no adapter was found: install a Vulkan driver (mesa-vulkan-drivers has one in software), or use --backend cpu"
+                    .into(),
+            ));
+        }
+        let adapter = all
+            .iter()
+            .find(|a| a.get_info().name.to_lowercase().contains(&name.to_lowercase()))
+            .ok_or_else(|| Error::Unsupported(format!("no adapter is called `{name}`; there are {}", known())))?;
+        let listed = list(adapter);
+        if listed.storage_buffers < STORAGE_BUFFERS {
+            return Err(Error::Unsupported(format!(
+                "{} binds {} storage buffers in a stage, and contact needs {STORAGE_BUFFERS}; use another adapter or --backend cpu",
+                listed.name, listed.storage_buffers
+            )));
+        }
+        let wanted = adapter.limits();
+        let limits = wgpu::Limits {
+            max_storage_buffers_per_shader_stage: STORAGE_BUFFERS,
+            max_storage_buffer_binding_size: wanted.max_storage_buffer_binding_size,
+            max_buffer_size: wanted.max_buffer_size,
+            max_compute_workgroup_storage_size: wanted.max_compute_workgroup_storage_size,
+            max_compute_workgroups_per_dimension: wanted.max_compute_workgroups_per_dimension,
+            ..wgpu::Limits::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("tricot"),
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+            required_limits: limits.clone(),
+            ..wgpu::DeviceDescriptor::default()
+        }))
+        .map_err(|e| Error::Unsupported(format!("{} cannot be opened: {e}", listed.name)))?;
+        let fault = Arc::new(Mutex::new(None));
+        let (lost, failed) = (Arc::clone(&fault), Arc::clone(&fault));
+        device.set_device_lost_callback(move |_, why| note(&lost, format!("the device was lost ({why})")));
+        device.on_uncaptured_error(Arc::new(move |error| note(&failed, error.to_string())));
+        let row_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("row"),
+            entries: &[wgpu::BindGroupLayoutEntry {
+                binding: 0,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty: wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Uniform,
+                    has_dynamic_offset: true,
+                    min_binding_size: None,
+                },
+                count: None,
+            }],
+        });
+        let device = Self { device, queue, listed, limits, row_layout, pipelines: Mutex::default(), fault };
+        let device = Arc::new(device);
+        super::self_test(&device)?;
+        Ok(device)
+    }
+
+    /// What the adapter is.
+    pub fn listed(&self) -> &Listed {
+        &self.listed
+    }
+
+    /// What made the device fail, if it has.
+    pub fn fault(&self) -> Option<String> {
+        let fault = self.fault.lock().unwrap_or_else(PoisonError::into_inner);
+        fault.as_ref().map(|what| format!("{}: {what}", self.listed.name))
+    }
+
+    pub(super) fn note(&self, what: String) {
+        note(&self.fault, what);
+    }
+
+    /// Drops the device as a driver would that crashed; to test that a run ends well.
+    pub fn lose(&self) {
+        self.device.destroy();
+    }
+
+    /// Whether the buffers of a scene fit.
+    ///
+    /// # Errors
+    /// The buffer that is too large, and what would fit.
+    pub(super) fn fits(&self, buffers: &[Description]) -> Result<()> {
+        let most = self.limits.max_storage_buffer_binding_size.min(self.limits.max_buffer_size);
+        let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+        let largest = buffers.iter().max_by_key(|b| b.len).filter(|b| 4 * b.len as u64 > most);
+        let Some(buffer) = largest else { return Ok(()) };
+        let bytes = 4 * buffer.len as u64;
+        Err(Error::Unsupported(format!(
+            "the scene's buffer `{}` has {:.0} MiB, and {} binds at most {:.0} MiB: a scene of {:.0} % of this size would fit; coarsen the \
+             mesh, use another adapter, or --backend cpu",
+            buffer.name,
+            mib(bytes),
+            self.listed.name,
+            mib(most),
+            100.0 * most as f64 / bytes as f64
+        )))
+    }
+
+    /// The compiled shader of a stage; compiled once for each text.
+    pub(super) fn pipeline(&self, stage: &Stage) -> Result<Arc<Pipeline>> {
+        let text = Text::of(stage)?;
+        let key = (text.text.clone(), stage.kernel.shader.entry);
+        let mut known = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pipeline) = known.get(&key) {
+            return Ok(Arc::clone(pipeline));
+        }
+        let pipeline = Arc::new(Pipeline::new(self, stage, &text)?);
+        known.insert(key, Arc::clone(&pipeline));
+        Ok(pipeline)
+    }
+
+    /// Memory that the workgroups of a stage may share, bytes.
+    pub(super) fn workgroup_bytes(&self) -> u32 {
+        self.limits.max_compute_workgroup_storage_size
+    }
+
+    /// Workgroups in one row of a dispatch.
+    pub(super) fn workgroups_in_a_row(&self) -> usize {
+        self.limits.max_compute_workgroups_per_dimension as usize
+    }
+}

@@ -1,0 +1,48 @@
+//! The arithmetic that a device must get right to the last bit: whole quanta with remainders that take many small steps, and
+//! sums of integers in any order. Compilers that re-associate floating-point sums would lose the steps.
+
+use super::lane::{Lane, Real};
+use super::position::{QUANTUM, carry, quanta};
+use super::shader::Shader;
+use super::stage::{Io, Kernel};
+use std::ops::Range;
+use std::sync::atomic::Ordering;
+
+/// Steps that every item takes.
+pub const STEPS: usize = 2048;
+
+pub const INCREMENTS: usize = 0;
+const QUANTA: usize = 1;
+const REMAINDER: usize = 2;
+/// Sum of all quanta, wrapping.
+const SUM: usize = 3;
+
+/// The march of every item.
+pub struct Exact;
+
+/// Where item `i` starts, quanta, and what it adds in each step, mm: from a thousandth of a quantum to a hundred.
+pub fn start(item: usize) -> (i32, f64) {
+    let sign = if item.is_multiple_of(2) { 1.0 } else { -1.0 };
+    (quanta(item as f64 * 0.37 - 150.0), sign * QUANTUM * libm::pow(10.0, (item % 97) as f64 * 5.0 / 96.0 - 3.0))
+}
+
+impl Kernel for Exact {
+    const SHADER: Shader = Shader::new("kernel/exact", "exact");
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let increments = io.scalars(INCREMENTS);
+        let mut quanta = io.own::<i32>(QUANTA);
+        let mut remainders = io.own::<L::Scalar>(REMAINDER);
+        let sum = io.atomics(SUM);
+        for item in items {
+            let (mut q, mut r) = (*quanta.at(0, item), *remainders.at(0, item));
+            for step in 0..STEPS {
+                let share = L::Scalar::from_i32((step % 7) as i32 + 1);
+                (q, r) = carry(q, r + increments[item] * share);
+            }
+            (*quanta.at(0, item), *remainders.at(0, item)) = (q, r);
+            sum[0].fetch_add(q, Ordering::Relaxed);
+        }
+    }
+}
