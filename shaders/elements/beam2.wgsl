@@ -3,6 +3,7 @@
 #include "kernel/stage"
 #include "kernel/row"
 #include "kernel/node"
+#include "kernel/vector"
 
 // Numbers of a beam in the table.
 const TABLE: u32 = 6u;
@@ -17,9 +18,7 @@ fn vector(beam: u32) -> Beam {
     let at = TABLE * beam;
     let reference = vec3<f32>(beams[at], beams[at + 1u], beams[at + 2u]);
     let fluctuation = displacement_between(ends[2u * beam + 1u], ends[2u * beam]);
-    let g = gradient();
-    let stretched = vec3<f32>(dot(g[0], reference), dot(g[1], reference), dot(g[2], reference));
-    return Beam(reference, stretched + fluctuation);
+    return Beam(reference, apply(gradient(), reference) + fluctuation);
 }
 
 #if PERIODIC
@@ -65,7 +64,7 @@ fn force(
     let axial = beams[TABLE * beam + 4u];
     let thermal = beams[TABLE * beam + 5u];
     let current = b.reference + b.change;
-    let length = sqrt(dot(current, current));
+    let length = norm(current);
     let strain = (2.0 * dot(b.reference, b.change) + dot(b.change, b.change)) / (rest * (length + rest));
     let tension = axial * (strain - thermal * row.thermal);
     let along = current * (tension / length);

@@ -37,8 +37,8 @@ fn force(
     let second = vector(pairs[2u * bend + 1u]);
     let current0 = first.reference + first.change;
     let current1 = second.reference + second.change;
-    let inverse0 = 1.0 / sqrt(dot(current0, current0));
-    let inverse1 = 1.0 / sqrt(dot(current1, current1));
+    let inverse0 = 1.0 / norm(current0);
+    let inverse1 = 1.0 / norm(current1);
     let tangent0 = current0 * inverse0;
     let tangent1 = current1 * inverse1;
     let cosine = dot(tangent0, tangent1);

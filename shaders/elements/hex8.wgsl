@@ -195,7 +195,14 @@ struct Sum {
     stress: Tensor,
 }
 
-fn add_point(h: Hex, point: u32, p: array<f32, PARAMETERS>, d: ptr<function, Derivatives>, add: Tensor, sum: ptr<function, Sum>) {
+fn add_point(
+    h: Hex,
+    point: u32,
+    p: array<f32, PARAMETERS>,
+    d: ptr<function, Derivatives>,
+    add: Tensor,
+    sum: ptr<function, Sum>,
+) {
     let weighted = stress(p, gradient_at(h, point, d, add)) * volume(h, point);
 #if PERIODIC
     (*sum).stress = (*sum).stress + weighted;
@@ -314,7 +321,8 @@ fn slope_across(h: Hex, point: u32, corner: u32) -> f32 {
     let n = select(vec3<f32>(FAR), vec3<f32>(NEAR), own);
     let sign = select(vec3<f32>(-1.0), vec3<f32>(1.0), high == vec3<u32>(1u));
     let slope = sign * n.yxx * n.zzy;
-    let across = fma(slope.zzz, inverse(h, point, 2u), fma(slope.yyy, inverse(h, point, 1u), slope.x * inverse(h, point, 0u)));
+    let lower = fma(slope.yyy, inverse(h, point, 1u), slope.x * inverse(h, point, 0u));
+    let across = fma(slope.zzz, inverse(h, point, 2u), lower);
     return sqrt(across.y * across.y + across.z * across.z);
 }
 

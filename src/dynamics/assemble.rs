@@ -41,9 +41,9 @@ pub const THREAD_SLOTS: usize = 2;
 pub const BEAM_FORCE: usize = 3;
 pub const BEND_FORCE: usize = 4;
 pub const MASS: usize = 5;
-/// Row sums of element stiffness, N/mm.
+/// Row sums of element stiffness, N/mm; only with contact-aware mass.
 pub const ELEMENT_STIFFNESS: usize = 6;
-/// Acceleration, mm/s² (3 planes).
+/// The first write: acceleration, mm/s² (3 planes); without contact-aware mass, all writes are one number earlier.
 const ACCELERATION: usize = 7;
 /// Inverse of the mass that acts, 1/tonne.
 const INVERSE_MASS: usize = 8;
@@ -75,11 +75,12 @@ impl<const CONTACT: bool, const MASS_ADDED: bool> Kernel for Assemble<CONTACT, M
         let (solid, hexes) = (io.uints(SOLID_SLOTS), io.scalars(HEX_FORCE));
         let (thread, beams, bends) = (io.uints(THREAD_SLOTS), io.scalars(BEAM_FORCE), io.scalars(BEND_FORCE));
         let masses = io.scalars(MASS);
-        let mut acceleration = io.own::<L::Scalar>(ACCELERATION);
-        let mut inverse = io.own::<L::Scalar>(INVERSE_MASS);
-        let mut contact_force = CONTACT.then(|| io.own::<i32>(CONTACT_FORCE));
-        let mut contact_stiffness = CONTACT.then(|| io.own::<i32>(CONTACT_STIFFNESS));
-        let elements = io.scalars(ELEMENT_STIFFNESS);
+        let missing = usize::from(!MASS_ADDED);
+        let mut acceleration = io.own::<L::Scalar>(ACCELERATION - missing);
+        let mut inverse = io.own::<L::Scalar>(INVERSE_MASS - missing);
+        let mut contact_force = CONTACT.then(|| io.own::<i32>(CONTACT_FORCE - missing));
+        let mut contact_stiffness = CONTACT.then(|| io.own::<i32>(CONTACT_STIFFNESS - missing));
+        let elements = if MASS_ADDED { io.scalars(ELEMENT_STIFFNESS) } else { &[] };
         let mut added = MASS_ADDED.then(|| io.own::<L::Scalar>(ADDED_MASS));
         let zero = L::Scalar::from_f64(0.0);
         let real = |x: f32| L::Scalar::from_f64(f64::from(x));
@@ -130,7 +131,7 @@ impl<const CONTACT: bool, const MASS_ADDED: bool> Kernel for Assemble<CONTACT, M
                     *added = needed.max(*added * real(params.mass_memory));
                     mass = mass + *added;
                 } else if contact > zero {
-                    raise(&io.atomic_uints(STATUS)[CONTACT_RATE], contact / mass);
+                    raise(&io.atomic_uints(STATUS - missing)[CONTACT_RATE], contact / mass);
                 }
             }
             let inverse_mass = L::Scalar::from_f64(1.0) / mass;

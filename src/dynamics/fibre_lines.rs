@@ -8,7 +8,8 @@
 //!
 //! diagonal 1/(β dt² k_s) + 1/m_s + 1/m_{s+1}, off-diagonal −d_s·d_{s+1}/m_{s+1}, right side −d_s·(a_{s+1} − a_s).
 //!
-//! The sweep runs along a group of up to sixteen lines at once, one line a lane.
+//! The sweep runs along a group of up to sixteen lines at once, one line a lane. The WGSL twin gives each line a workgroup and
+//! solves the same system, bordered by its last row, by parallel cyclic reduction.
 
 use crate::elements::hex8::LANES;
 use crate::kernel::lane::{Lane, Real};

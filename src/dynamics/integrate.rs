@@ -23,10 +23,10 @@ pub struct Params {
 
 pub const ACCELERATION: usize = 0;
 pub const MASS: usize = 1;
-/// With `LINES`.
-pub const CORRECTION: usize = 2;
-pub const INVERSE_MASS: usize = 3;
-/// Velocity, mm/s (3 planes).
+pub const INVERSE_MASS: usize = 2;
+/// Only with `LINES`.
+pub const CORRECTION: usize = 3;
+/// The first write: velocity, mm/s (3 planes); without `LINES`, all writes are one number earlier.
 const VELOCITY: usize = 4;
 const QUANTA: usize = 5;
 const REMAINDER: usize = 6;
@@ -65,12 +65,14 @@ impl<const LINES: bool, const GRAVITY: bool> Kernel for Integrate<LINES, GRAVITY
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();
         let (acceleration, masses) = (io.scalars(ACCELERATION), io.scalars(MASS));
-        let (correction, inverse) = (io.scalars(CORRECTION), io.scalars(INVERSE_MASS));
+        let inverse = io.scalars(INVERSE_MASS);
+        let correction = if LINES { io.scalars(CORRECTION) } else { &[] };
         let plane = masses.len();
-        let mut velocity = io.own::<L::Scalar>(VELOCITY);
-        let mut quanta = io.own::<i32>(QUANTA);
-        let mut remainder = io.own::<L::Scalar>(REMAINDER);
-        let mut works = io.own::<L::Scalar>(WORK);
+        let missing = usize::from(!LINES);
+        let mut velocity = io.own::<L::Scalar>(VELOCITY - missing);
+        let mut quanta = io.own::<i32>(QUANTA - missing);
+        let mut remainder = io.own::<L::Scalar>(REMAINDER - missing);
+        let mut works = io.own::<L::Scalar>(WORK - missing);
         let row = io.row;
         let solid = factors(row.damping_solid, row.dt_mid);
         let thread = factors(row.damping_thread, row.dt_mid);

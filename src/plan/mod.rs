@@ -310,7 +310,8 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         mass_factor: contact_mass.map_or(0.0, |c| c.factor as f32),
         mass_memory: contact_mass.map_or(0.0, |c| c.memory as f32),
     };
-    let reads = [solid_slots, hex_force, thread_slots, beam_force, bend_force, mass, element_limit];
+    let mut reads = vec![solid_slots, hex_force, thread_slots, beam_force, bend_force, mass];
+    reads.extend(contact_mass.map(|_| element_limit));
     let mut writes = vec![(acceleration, own(3, 1)), (inverse_mass, own(1, 1))];
     let mut added_mass = None;
     let assembly = match &contact {
@@ -359,7 +360,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     // fibre lines
     let line_stiffness = [&solids.line_stiffness[..], &threads.line_stiffness].concat();
     let mut covered = vec![false; nodes];
-    let mut correction = acceleration;
+    let mut correction = None;
     let mut line_factor = 1.0;
     if let Some(lines) = &effects.fibre_lines {
         let groups = line_groups(mesh, lines.threads);
@@ -367,13 +368,18 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             covered[g.first as usize..][..(g.lines * g.stations) as usize].fill(true);
         }
         line_factor = libm::sqrt((1.0 - 0.25 / lines.beta).max(0.01));
-        correction = b.scratch("line correction", 3 * nodes);
+        let response = b.scratch("line correction", 3 * nodes);
+        correction = Some(response);
         let table = b.indices("fibre lines", bytemuck::cast_slice(&groups).to_vec());
         let stiffness = b.table("line stiffness", line_stiffness.clone());
         let reads = [table, stiffness, reference, quanta_, remainder, acceleration, inverse_mass];
         let params = fibre_lines::Params { beta: lines.beta as f32 };
-        let writes = [(correction, Access::Scatter)];
-        b.plan.step.push(after::<fibre_lines::FibreLines>("fibre lines", groups.len(), 1, &reads, &writes, params));
+        let writes = [(response, Access::Scatter)];
+        let longest = groups.iter().map(|g| g.stations as usize).max().unwrap_or(1);
+        b.plan.step.push(Stage {
+            constants: vec![("STATIONS", longest)],
+            ..after::<fibre_lines::FibreLines>("fibre lines", groups.len(), 1, &reads, &writes, params)
+        });
         if let Some((at, count)) = condition_nodes {
             b.plan.step.push(after::<prescribed::Hold>("hold", count, NODE_GRAIN, &[at], &writes, [0u32; 0]));
         }
@@ -381,7 +387,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
 
     // motion
     let params = integrate::Params { first_thread, gravity };
-    let reads = [acceleration, mass, correction, inverse_mass];
+    let reads: Vec<Buffer> = [acceleration, mass, inverse_mass].into_iter().chain(correction).collect();
     let writes = [(velocity, own(3, 1)), (quanta_, own(3, 1)), (remainder, own(3, 1)), (work, own(3, 1))];
     let lines = effects.fibre_lines.is_some();
     b.plan.step.push(match (lines, effects.gravity_mm_s2.is_some()) {

@@ -1,0 +1,96 @@
+// Prescribed motion: the velocity of chosen components follows the amplitude of the schedule exactly.
+
+#include "kernel/stage"
+#include "kernel/row"
+#include "dynamics/integrate"
+
+#if ROOT
+// Node and mask of components, 2 numbers a condition.
+@group(1) @binding(0) var<storage, read> nodes: array<u32>;
+
+#if prescribed
+struct Params {
+    first_thread: u32,
+    gravity_x: f32,
+    gravity_y: f32,
+    gravity_z: f32,
+}
+
+@group(2) @binding(1) var<uniform> params: Params;
+
+@group(1) @binding(1) var<storage, read> targets: array<f32>;
+@group(1) @binding(2) var<storage, read> velocity: array<f32>;
+@group(1) @binding(3) var<storage, read> mass: array<f32>;
+@group(1) @binding(4) var<storage, read_write> acceleration: array<f32>;
+@group(1) @binding(5) var<storage, read_write> inverse_mass: array<f32>;
+@group(1) @binding(6) var<storage, read_write> work: array<f32>;
+@group(1) @binding(7) var<storage, read_write> reactions: array<f32>;
+
+// Replaces accelerations of prescribed components, before fibre lines see them.
+@compute @workgroup_size(WORKGROUP)
+fn prescribed(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let number = invocation(workgroup, workgroups, local);
+    if number >= items.count {
+        return;
+    }
+    let item = items.first + number;
+    let node = nodes[2u * item];
+    let mask = nodes[2u * item + 1u];
+    let plane = arrayLength(&mass);
+    let gravity = vec3<f32>(params.gravity_x, params.gravity_y, params.gravity_z);
+    let damping = select(row.damping_thread, row.damping_solid, node < params.first_thread);
+    let keep_gain = factors(damping, row.dt_mid);
+    for (var k = 0u; k < 3u; k++) {
+        if ((mask >> k) & 1u) == 0u {
+            continue;
+        }
+        let place = node + k * plane;
+        let v = velocity[place];
+        let force = acceleration[place] / inverse_mass[node];
+        let aim = targets[3u * item + k] * row.motion;
+        let a = (aim - v * keep_gain.x) / keep_gain.y - gravity[k];
+        acceleration[place] = a;
+        let mean = (v + aim) * 0.5;
+        // a node that is held altogether carries no added mass
+        var inertia = mass[node];
+        if mask != 7u {
+            inertia = 1.0 / inverse_mass[node];
+        }
+        let reaction = inertia * a - force;
+        work[item] = work[item] + reaction * mean * row.dt_mid;
+        reactions[3u * item + k] = force;
+    }
+    if mask == 7u {
+        inverse_mass[node] = 0.0;
+    }
+}
+#endif
+
+#if hold
+@group(1) @binding(1) var<storage, read_write> correction: array<f32>;
+
+// Takes back what fibre lines did to prescribed components.
+@compute @workgroup_size(WORKGROUP)
+fn hold(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let number = invocation(workgroup, workgroups, local);
+    if number >= items.count {
+        return;
+    }
+    let item = items.first + number;
+    let plane = arrayLength(&correction) / 3u;
+    for (var k = 0u; k < 3u; k++) {
+        if ((nodes[2u * item + 1u] >> k) & 1u) == 1u {
+            correction[nodes[2u * item] + k * plane] = 0.0;
+        }
+    }
+}
+#endif
+#endif

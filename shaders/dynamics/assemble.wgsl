@@ -1,0 +1,144 @@
+// Accelerations: each node gathers its corner slots in a fixed order, adds contact, and divides by its mass.
+
+#include "kernel/stage"
+#include "kernel/row"
+#include "elements/hex8"
+
+// Corner slots a solid node gathers.
+const SOLID: u32 = 8u;
+// Slots a thread node gathers.
+const THREAD: u32 = 5u;
+// Nothing to gather.
+const NONE: u32 = 0xffffffffu;
+
+#if ROOT
+#if CONTACT
+#if MASS_ADDED
+#else
+#define STATUS
+#include "contact/mod"
+#endif
+#endif
+
+struct Params {
+    first_thread: u32,
+    force_quantum: f32,
+    stiffness_quantum: f32,
+    mass_factor: f32,
+    mass_memory: f32,
+}
+
+@group(2) @binding(1) var<uniform> params: Params;
+
+@group(1) @binding(0) var<storage, read> solid_slots: array<u32>;
+@group(1) @binding(1) var<storage, read> hex_force: array<f32>;
+@group(1) @binding(2) var<storage, read> thread_slots: array<u32>;
+@group(1) @binding(3) var<storage, read> beam_force: array<f32>;
+@group(1) @binding(4) var<storage, read> bend_force: array<f32>;
+@group(1) @binding(5) var<storage, read> mass: array<f32>;
+#if MASS_ADDED
+@group(1) @binding(6) var<storage, read> element_stiffness: array<f32>;
+const WRITES: u32 = 7u;
+#else
+const WRITES: u32 = 6u;
+#endif
+@group(1) @binding(WRITES) var<storage, read_write> acceleration: array<f32>;
+@group(1) @binding(WRITES + 1u) var<storage, read_write> inverse_mass: array<f32>;
+#if CONTACT
+@group(1) @binding(WRITES + 2u) var<storage, read_write> contact_force: array<i32>;
+@group(1) @binding(WRITES + 3u) var<storage, read_write> contact_stiffness: array<i32>;
+#if MASS_ADDED
+@group(1) @binding(WRITES + 4u) var<storage, read_write> added_mass: array<f32>;
+#else
+@group(1) @binding(WRITES + 4u) var<storage, read_write> status: array<atomic<u32>>;
+#endif
+
+// Contact force of one component in N, set back to zero.
+fn taken(at: u32) -> f32 {
+    let quanta = contact_force[at];
+    if quanta != 0 {
+        contact_force[at] = 0;
+    }
+    return f32(quanta) * params.force_quantum;
+}
+#endif
+
+fn hex_at(slot: u32) -> vec3<f32> {
+    return vec3<f32>(hex_force[slot], hex_force[slot + LANES], hex_force[slot + 2u * LANES]);
+}
+
+fn beam_at(slot: u32) -> vec3<f32> {
+    return vec3<f32>(beam_force[3u * slot], beam_force[3u * slot + 1u], beam_force[3u * slot + 2u]);
+}
+
+fn bend_at(slot: u32, k: u32) -> vec3<f32> {
+    let at = 6u * slot + 3u * k;
+    return vec3<f32>(bend_force[at], bend_force[at + 1u], bend_force[at + 2u]);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn assemble(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let number = invocation(workgroup, workgroups, local);
+    if number >= items.count {
+        return;
+    }
+    let node = items.first + number;
+    let plane = arrayLength(&mass);
+    var force = vec3<f32>();
+    if node < params.first_thread {
+        for (var k = 0u; k < SOLID; k++) {
+            let slot = solid_slots[SOLID * node + k];
+            if slot == NONE {
+                break;
+            }
+            force = force + hex_at(slot);
+        }
+    } else {
+        let at = THREAD * (node - params.first_thread);
+        // the node is the first of one beam and the second of another
+        if thread_slots[at] != NONE {
+            force = force + beam_at(thread_slots[at]);
+        }
+        if thread_slots[at + 1u] != NONE {
+            force = force - beam_at(thread_slots[at + 1u]);
+        }
+        // the first, middle and last node of three bends
+        if thread_slots[at + 2u] != NONE {
+            force = force + bend_at(thread_slots[at + 2u], 0u);
+        }
+        if thread_slots[at + 3u] != NONE {
+            force = force - bend_at(thread_slots[at + 3u], 0u);
+            force = force + bend_at(thread_slots[at + 3u], 1u);
+        }
+        if thread_slots[at + 4u] != NONE {
+            force = force - bend_at(thread_slots[at + 4u], 1u);
+        }
+    }
+    var acting = mass[node];
+#if CONTACT
+    force = force + vec3<f32>(taken(node), taken(node + plane), taken(node + 2u * plane));
+    let contact = f32(contact_stiffness[node]) * params.stiffness_quantum;
+    contact_stiffness[node] = 0;
+#if MASS_ADDED
+    let reach = params.mass_factor * 0.25 * row.dt * row.dt;
+    let needed = select(0.0, (contact + element_stiffness[node]) * reach - acting, contact > 0.0);
+    let added = max(needed, added_mass[node] * params.mass_memory);
+    added_mass[node] = added;
+    acting = acting + added;
+#else
+    if contact > 0.0 {
+        raise(CONTACT_RATE, contact / acting);
+    }
+#endif
+#endif
+    let inverse = 1.0 / acting;
+    inverse_mass[node] = inverse;
+    acceleration[node] = force.x * inverse;
+    acceleration[node + plane] = force.y * inverse;
+    acceleration[node + 2u * plane] = force.z * inverse;
+}
+#endif

@@ -1,0 +1,165 @@
+// Fibre-line selective mass scaling: one workgroup works on one line, and solves its system by parallel cyclic reduction.
+
+#include "kernel/row"
+#include "kernel/stage"
+#define REFERENCE
+#include "kernel/node"
+#include "kernel/vector"
+#include "elements/hex8"
+
+#if ROOT
+// Integers of a group in the table.
+const GROUP: u32 = 6u;
+// Stations that an invocation looks after; STATIONS is the longest line.
+const ROUNDS: u32 = (STATIONS + WORKGROUP - 1u) / WORKGROUP;
+
+struct Params {
+    // Strength β of the added inertia.
+    beta: f32,
+}
+
+@group(2) @binding(1) var<uniform> params: Params;
+
+@group(1) @binding(0) var<storage, read> groups: array<u32>;
+@group(1) @binding(1) var<storage, read> stiffness: array<f32>;
+@group(1) @binding(2) var<storage, read> reference: array<i32>;
+@group(1) @binding(3) var<storage, read> quanta: array<i32>;
+@group(1) @binding(4) var<storage, read> remainder: array<f32>;
+@group(1) @binding(5) var<storage, read> acceleration: array<f32>;
+@group(1) @binding(6) var<storage, read> inverse_mass: array<f32>;
+@group(1) @binding(7) var<storage, read_write> correction: array<f32>;
+
+// Direction of the segment that starts at a station, zero for none, and inverse mass of the station.
+var<workgroup> stations: array<vec4<f32>, STATIONS>;
+// Diagonal, coupling to the next row of the same subsystem, right side, and coupling to the last row.
+var<workgroup> rows: array<vec4<f32>, STATIONS>;
+
+// Current direction of the segment between two nodes.
+fn direction(here: u32, next: u32, shift: vec2<i32>) -> vec3<f32> {
+    let rest = lattice_between(next, here, shift);
+    let v = rest + apply(gradient(), rest) + displacement_between(next, here);
+    return v * (1.0 / norm(v));
+}
+
+fn acceleration_at(node: u32) -> vec3<f32> {
+    let plane = arrayLength(&inverse_mass);
+    return vec3<f32>(acceleration[node], acceleration[node + plane], acceleration[node + 2u * plane]);
+}
+
+// Off-diagonal between a segment and the next.
+fn coupling(i: u32, next: u32) -> f32 {
+    return -(dot(stations[i].xyz, stations[next].xyz) * stations[next].w);
+}
+
+// Unknown of a row once the reduction has left diagonals only; `end` is that of the last row.
+fn solution(i: u32, end: f32) -> f32 {
+    return (rows[i].z - rows[i].w * end) / rows[i].x;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn fibre_lines(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let number = workgroup.y * workgroups.x + workgroup.x;
+    if number >= items.count * LANES {
+        return;
+    }
+    let group = GROUP * (items.first + number / LANES);
+    let lane = number % LANES;
+    if lane >= groups[group + 1u] {
+        return;
+    }
+    let n = groups[group + 2u];
+    let first = groups[group] + lane * n;
+    let closed = groups[group + 3u] == 1u;
+    let wrap = vec2<i32>(bitcast<i32>(groups[group + 4u]), bitcast<i32>(groups[group + 5u]));
+    let last = n - 1u;
+
+    for (var i = local; i < n; i += WORKGROUP) {
+        let here = first + i;
+        var d = vec3<f32>();
+        if stiffness[here] > 0.0 && i < last {
+            d = direction(here, here + 1u, vec2<i32>());
+        } else if stiffness[here] > 0.0 && closed {
+            d = direction(here, first, wrap);
+        }
+        stations[i] = vec4<f32>(d, inverse_mass[here]);
+    }
+    workgroupBarrier();
+
+    // the last row is the border; without a last segment nothing couples to it
+    let compliance = 1.0 / (params.beta * row.dt * row.dt);
+    for (var i = local; i < n; i += WORKGROUP) {
+        let next = select(i + 1u, 0u, i == last);
+        let d = stations[i].xyz;
+        var diagonal = 1.0;
+        if any(d != vec3<f32>()) {
+            diagonal = compliance / stiffness[first + i] + stations[i].w + stations[next].w;
+        }
+        let right = -dot(d, acceleration_at(first + next) - acceleration_at(first + i));
+        var along = coupling(i, next);
+        var border = 0.0;
+        if i == 0u {
+            border = coupling(last, 0u);
+        }
+        if i + 1u == last {
+            border = border + along;
+            along = 0.0;
+        }
+        rows[i] = vec4<f32>(diagonal, along, right, border);
+    }
+    workgroupBarrier();
+
+    for (var step = 1u; step < last; step *= 2u) {
+        var reduced = array<vec4<f32>, ROUNDS>();
+        for (var round = 0u; round < ROUNDS; round++) {
+            let i = local + round * WORKGROUP;
+            if i < last {
+                var r = rows[i];
+                let along = r.y;
+                r.y = 0.0;
+                if i >= step {
+                    let low = rows[i - step];
+                    let factor = low.y / low.x;
+                    r = r - factor * vec4<f32>(low.y, 0.0, low.z, low.w);
+                }
+                if i + step < last {
+                    let high = rows[i + step];
+                    let factor = along / high.x;
+                    r = r - factor * vec4<f32>(along, high.y, high.z, high.w);
+                }
+                reduced[round] = r;
+            }
+        }
+        workgroupBarrier();
+        for (var round = 0u; round < ROUNDS; round++) {
+            let i = local + round * WORKGROUP;
+            if i < last {
+                rows[i] = reduced[round];
+            }
+        }
+        workgroupBarrier();
+    }
+
+    // what the first and the last but one row are coupled to the last with
+    let back = coupling(last, 0u);
+    let ahead = coupling(last - 1u, last);
+    let low = rows[0];
+    let high = rows[last - 1u];
+    let bottom = rows[last];
+    let right = bottom.z - back * (low.z / low.x) - ahead * (high.z / high.x);
+    let end = right / (bottom.x - back * (low.w / low.x) - ahead * (high.w / high.x));
+    let plane = arrayLength(&inverse_mass);
+    for (var i = local; i < n; i += WORKGROUP) {
+        let previous = select(i - 1u, last, i == 0u);
+        let p = select(solution(previous, end), end, previous == last);
+        let q = select(solution(i, end), end, i == last);
+        let a = (p * stations[previous].xyz - q * stations[i].xyz) * stations[i].w;
+        correction[first + i] = a.x;
+        correction[first + i + plane] = a.y;
+        correction[first + i + 2u * plane] = a.z;
+    }
+}
+#endif
