@@ -42,7 +42,9 @@ fn main() {
     for stage in &plan.step {
         bench(&mut criterion, stage.name, &cell, &make, std::slice::from_ref(stage), row);
     }
-    for (name, stages) in [("all of search", &plan.search), ("all of diagnose", &plan.diagnose)] {
+    for (name, stages) in
+        [("all of search", &plan.search), ("all of diagnose", &plan.diagnose), ("all of collect", &plan.collect)]
+    {
         bench(&mut criterion, name, &cell, &make, stages, row);
     }
     criterion.final_summary();

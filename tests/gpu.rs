@@ -12,6 +12,7 @@ use tricot::backend::cpu::Cpu;
 use tricot::backend::gpu::{Device, Gpu};
 use tricot::kernel::buffer::{Buffer, Kind};
 use tricot::kernel::lane::Isa;
+use tricot::kernel::position::QUANTUM;
 use tricot::kernel::row::Row;
 use tricot::kernel::stage::Access;
 use tricot::run;
@@ -74,73 +75,93 @@ fn free() -> Value {
     )
 }
 
-/// Largest difference of two buffers over the largest number, and how many integers differ at all.
-fn difference(kind: Kind, ours: &[u8], theirs: &[u8]) -> (f64, usize) {
-    let numbers = |bytes: &[u8]| -> Vec<f64> {
-        bytes
-            .chunks_exact(4)
-            .map(|b| {
-                let b = b.try_into().unwrap();
-                match kind {
-                    Kind::Scalar => f64::from(f32::from_ne_bytes(b)),
-                    Kind::Int => f64::from(i32::from_ne_bytes(b)),
-                    Kind::Uint => f64::from(u32::from_ne_bytes(b)),
-                }
-            })
-            .collect()
-    };
-    let (ours, theirs) = (numbers(ours), numbers(theirs));
-    let largest = theirs.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+/// The numbers of a buffer, whatever they are.
+fn numbers(backend: &dyn Backend, kind: Kind, buffer: Buffer) -> Vec<f64> {
+    match kind {
+        Kind::Scalar => backend.scalars(buffer),
+        Kind::Int => backend.ints(buffer).into_iter().map(f64::from).collect(),
+        Kind::Uint => backend.uints(buffer).into_iter().map(f64::from).collect(),
+    }
+}
+
+/// Largest difference of two lists of numbers over the largest number, and how many differ at all.
+fn difference(ours: &[f64], theirs: &[f64]) -> (f64, usize) {
+    assert_eq!(ours.len(), theirs.len());
+    let largest = theirs.iter().fold(1e-30, |m: f64, x| m.max(x.abs()));
     let mut worst = 0.0f64;
     let mut unequal = 0;
-    for (a, b) in ours.iter().zip(&theirs) {
-        unequal += usize::from(a != b);
-        let error = if a == b { 0.0 } else { (a - b).abs() / largest.max(1e-30) };
+    for (a, b) in ours.iter().zip(theirs).filter(|(a, b)| a != b) {
+        unequal += 1;
+        let error = (a - b).abs() / largest;
         worst = if error.is_finite() { worst.max(error) } else { f64::INFINITY };
     }
     (worst, unequal)
 }
 
-/// Largest difference per stage and buffer that is allowed, relative to the buffer's largest number.
-fn allowed(buffer: &str) -> f64 {
-    match buffer {
-        // bits of maxima, counts and flags
-        "status" => 1e-6,
-        _ => 2e-5,
-    }
+/// What is allowed of the GPU against the CPU in f32, over the largest number of a buffer.
+const ALLOWED: f64 = 2e-5;
+/// Where f32 itself is further off than that (fibre stress at small strain): the GPU may be so many times further from f64 than
+/// the CPU in f32 is.
+const ROUNDING: f64 = 2.0;
+
+/// What was found of one buffer of one stage.
+#[derive(Default, Clone, Copy)]
+struct Found {
+    /// Largest difference between the GPU and the CPU in f32, and numbers that differ.
+    difference: f64,
+    unequal: usize,
+    /// Largest differences of the GPU and of the CPU in f32 from the CPU in f64.
+    from_f64: [f64; 2],
+    failed: bool,
 }
 
-/// Runs every stage of a plan on both backends from the state of a simulation, and returns the worst difference per stage and
-/// buffer.
-fn compare(device: &Arc<Device>, simulation: &Simulation, worst: &mut BTreeMap<(String, &'static str), (f64, usize)>) {
-    let plan = &simulation.model.plan;
-    let mut cpu = Cpu::<f32>::new(&plan.buffers, 1, Isa::best());
+/// Runs every stage of a plan on three backends from the state of a simulation.
+fn compare(device: &Arc<Device>, simulation: &Simulation, found: &mut BTreeMap<(&'static str, &'static str), Found>) {
+    let model = &simulation.model;
+    let plan = &model.plan;
     let mut gpu = Gpu::new(Arc::clone(device), &plan.buffers).unwrap_or_else(|e| panic!("{e}"));
+    let mut cpu = Cpu::<f32>::new(&plan.buffers, 1, Isa::best());
+    let mut double = Cpu::<f64>::new(&plan.buffers, 1, Isa::best());
     for buffer in (0..plan.buffers.len()).map(Buffer) {
         cpu.set_bytes(buffer, &simulation.backend().bytes(buffer));
     }
     let (time, dt) = (simulation.time(), simulation.dt());
     let row = Row { approach: 100.0, ..simulation.schedule.row(time, dt, dt) };
-    for stage in [&plan.search, &plan.diagnose, &plan.step, &plan.watch].into_iter().flatten().filter(|s| s.count > 0) {
+    let stages = [&plan.search, &plan.diagnose, &plan.step, &plan.watch, &plan.collect];
+    for stage in stages.into_iter().flatten().filter(|s| s.count > 0) {
         for buffer in stage.reads.iter().chain(stage.writes.iter().map(|(b, _)| b)) {
             gpu.set_bytes(*buffer, &cpu.bytes(*buffer));
+            match plan.buffers[buffer.0].kind {
+                Kind::Scalar => double.set_scalars(*buffer, &cpu.scalars(*buffer)),
+                _ => double.set_bytes(*buffer, &cpu.bytes(*buffer)),
+            }
         }
-        gpu.run(std::slice::from_ref(stage), &[row]);
-        cpu.run(std::slice::from_ref(stage), &[row]);
+        let backends: [&mut dyn Backend; 3] = [&mut gpu, &mut cpu, &mut double];
+        backends.into_iter().for_each(|b| b.run(std::slice::from_ref(stage), &[row]));
+        assert_eq!(gpu.fault(), None);
         for (buffer, access) in &stage.writes {
             let description = &plan.buffers[buffer.0];
-            // lists of cells are in any order
-            if description.name == "cells" && *access == Access::Scatter {
+            // lists of cells are in any order, and a quantum may be in the whole part or in the remainder
+            if description.name == "cells" && *access == Access::Scatter || *buffer == model.buffers.quanta {
                 continue;
             }
-            let now = difference(description.kind, &gpu.bytes(*buffer), &cpu.bytes(*buffer));
-            if now.0 > allowed(description.name) {
-                println!("{}: {} differs by {:.1e}, {} numbers", stage.name, description.name, now.0, now.1);
-            }
-            let entry = worst.entry((stage.name.to_owned(), description.name)).or_default();
-            *entry = (entry.0.max(now.0), entry.1.max(now.1));
+            let of = |backend: &dyn Backend| {
+                let values = numbers(backend, description.kind, *buffer);
+                if *buffer == model.buffers.remainder {
+                    let whole = backend.ints(model.buffers.quanta);
+                    return values.iter().zip(whole).map(|(r, q)| f64::from(q) * QUANTUM + r).collect();
+                }
+                values
+            };
+            let (ours, theirs, exact) = (of(&gpu), of(&cpu), of(&double));
+            let (worst, unequal) = difference(&ours, &theirs);
+            let from_f64 = [&ours, &theirs].map(|x| difference(x, &exact).0);
+            let entry = found.entry((stage.name, description.name)).or_default();
+            entry.failed |= worst > ALLOWED && from_f64[0] > ROUNDING * from_f64[1];
+            entry.difference = entry.difference.max(worst);
+            entry.unequal = entry.unequal.max(unequal);
+            entry.from_f64 = [0, 1].map(|i| entry.from_f64[i].max(from_f64[i]));
         }
-        assert_eq!(gpu.fault(), None);
     }
 }
 
@@ -148,14 +169,14 @@ fn compare(device: &Arc<Device>, simulation: &Simulation, worst: &mut BTreeMap<(
 fn every_stage_agrees_with_the_cpu_on_every_buffer() {
     let Some(device) = device() else { return };
     println!("{:?}", device.listed());
-    let mut worst = BTreeMap::new();
+    let mut found = BTreeMap::new();
     let make = || Make { threads: 1, ..Make::default() };
     for case in [cell(), free()] {
         let end = 2.5e-4f64.min(if case["domain"].get("cell").is_some() { 1.0 } else { 1e-4 });
         let mut simulation = run::simulation(&loaded(&case), make()).unwrap();
         // a state in mid-run, then random ones
         advance(&mut simulation, end);
-        compare(&device, &simulation, &mut worst);
+        compare(&device, &simulation, &mut found);
         let mut random = Random(1);
         for size in [1e-3, 1e-2] {
             let mut noise = |v: Vec<[f64; 3]>, size: f64| -> Vec<[f64; 3]> {
@@ -164,13 +185,14 @@ fn every_stage_agrees_with_the_cpu_on_every_buffer() {
             let (w, v) = (noise(simulation.fluctuations(), size), noise(simulation.velocities(), 1e4 * size));
             simulation.set_fluctuations(&w);
             simulation.set_velocities(&v);
-            compare(&device, &simulation, &mut worst);
+            compare(&device, &simulation, &mut found);
         }
     }
-    for ((stage, buffer), (error, unequal)) in &worst {
-        println!("{stage:14} {buffer:32} {error:.1e} ({unequal} numbers are not the same)");
+    println!("{:16} {:32} GPU from CPU (numbers that differ)   GPU, CPU from f64", "stage", "buffer");
+    for ((stage, buffer), f) in &found {
+        let [gpu, cpu] = f.from_f64;
+        println!("{stage:16} {buffer:32} {:8.1e} ({:6})   {gpu:8.1e} {cpu:8.1e}", f.difference, f.unequal);
     }
-    for ((stage, buffer), (error, _)) in worst {
-        assert!(error <= allowed(buffer), "{stage}: {buffer} differs by {error:.1e}");
-    }
+    let failed: Vec<_> = found.iter().filter(|(_, f)| f.failed).map(|(place, _)| place).collect();
+    assert!(failed.is_empty(), "{failed:?} differ");
 }

@@ -6,13 +6,27 @@ const LOG2_E: f32 = 1.4426950408889634;
 const SQRT_HALF: u32 = 0x3f3504f3u;
 const BIAS: u32 = 0x3f800000u;
 
-// Natural logarithm of a positive normal number.
-fn ln(x: f32) -> f32 {
+// Mantissa from √½ to √2, and exponent, of a positive normal number.
+fn mantissa_exponent(x: f32) -> vec2<f32> {
     let bits = bitcast<u32>(x);
     let biased = (bits - SQRT_HALF + BIAS) >> 23u;
-    let m = bitcast<f32>(bits - (biased << 23u) + BIAS);
-    let e = f32(biased) - 127.0;
-    let f = m - 1.0;
+    return vec2<f32>(bitcast<f32>(bits - (biased << 23u) + BIAS), f32(biased) - 127.0);
+}
+
+// Natural logarithm of a positive normal number.
+fn ln(x: f32) -> f32 {
+    let split = mantissa_exponent(x);
+    return logarithm(split.x - 1.0, split.y);
+}
+
+// ln(1 + x) for x > −1.
+fn log1p(x: f32) -> f32 {
+    let split = mantissa_exponent(1.0 + x);
+    return logarithm(select(split.x - 1.0, x, abs(split.y) < 0.5), split.y);
+}
+
+// ln(1 + f) + e ln 2.
+fn logarithm(f: f32, e: f32) -> f32 {
     let s = f / (f + 2.0);
     let z = s * s;
     var p = 1.0 / 11.0;
@@ -22,12 +36,6 @@ fn ln(x: f32) -> f32 {
     p = fma(p, z, 1.0 / 3.0);
     p = fma(p, z, 1.0);
     return fma(e, LN2_HIGH, fma(s + s, p, e * LN2_LOW));
-}
-
-// ln(1 + x) for x > −1.
-fn log1p(x: f32) -> f32 {
-    let u = 1.0 + x;
-    return ln(u) + (x - (u - 1.0)) / u;
 }
 
 // e^x for |x| below 80.

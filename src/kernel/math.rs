@@ -10,7 +10,20 @@ const LN2_LOW: f64 = 1.428_606_820_309_417_2e-6;
 #[inline(always)]
 pub fn ln<L: Lane>(x: L) -> L {
     let (m, e) = x.mantissa_exponent();
-    let f = m - L::new(1.0);
+    logarithm(m - L::new(1.0), e)
+}
+
+/// ln(1 + x) for x > −1, accurate for small x: as long as 1 + x has the exponent of 1, its mantissa less 1 is x itself,
+/// without the rounding of the sum.
+#[inline(always)]
+pub fn log1p<L: Lane>(x: L) -> L {
+    let (m, e) = (L::new(1.0) + x).mantissa_exponent();
+    logarithm(L::select(e.abs().lt(L::new(0.5)), x, m - L::new(1.0)), e)
+}
+
+/// ln(1 + f) + e ln 2, the first as 2 atanh(f/(f + 2)), the second in two parts.
+#[inline(always)]
+fn logarithm<L: Lane>(f: L, e: L) -> L {
     let s = f / (f + L::new(2.0));
     let z = s * s;
     let terms = L::Scalar::LN_TERMS;
@@ -18,15 +31,7 @@ pub fn ln<L: Lane>(x: L) -> L {
     for k in (0..terms).rev() {
         p = p.fma(z, L::new(1.0 / (2 * k + 1) as f64));
     }
-    // 2 atanh(s) = 2 s p, with the exponent in two parts
     e.fma(L::new(LN2_HIGH), (s + s).fma(p, e * L::new(LN2_LOW)))
-}
-
-/// ln(1 + x) for x > −1, accurate for small x.
-#[inline(always)]
-pub fn log1p<L: Lane>(x: L) -> L {
-    let u = L::new(1.0) + x;
-    ln(u) + (x - (u - L::new(1.0))) / u
 }
 
 /// e^x for |x| below 80.

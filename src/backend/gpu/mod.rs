@@ -20,11 +20,11 @@ use crate::kernel::buffer::{Array, Buffer, Description, Initial, Kind};
 use crate::kernel::exact::{self, Exact};
 use crate::kernel::lane::Isa;
 use crate::kernel::row::Row;
-use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Access, Code, Stage};
 use pipeline::Bound;
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::Arc;
 use wgpu::util::DeviceExt as _;
 
@@ -45,13 +45,11 @@ pub struct Gpu {
     shapes: Vec<(Kind, usize)>,
     rows: wgpu::Buffer,
     row_group: wgpu::BindGroup,
-    bound: HashMap<Key, Bound>,
+    /// By [`key`].
+    bound: HashMap<u64, Bound>,
     saved: Vec<(Buffer, wgpu::Buffer)>,
     work: RefCell<Work>,
 }
-
-/// What makes a stage of a plan different from its other stages.
-type Key = (&'static str, Shader, usize, usize);
 
 /// Commands that are recorded and not submitted, and times that are measured.
 struct Work {
@@ -146,10 +144,6 @@ impl Gpu {
         })
     }
 
-    fn key(stage: &Stage) -> Key {
-        (stage.name, stage.kernel.shader, stage.first, stage.count)
-    }
-
     /// Submits what is recorded.
     fn flush(&self) {
         let mut work = self.work.borrow_mut();
@@ -191,7 +185,7 @@ impl Gpu {
     /// Records stages for one row that is in place; each in a pass of its own if they are timed.
     fn record(&self, work: &mut Work, stages: &[Stage], rows: &[u32], timed: bool) {
         let ready: Vec<(&Stage, &Bound)> =
-            stages.iter().filter(|s| s.count > 0).filter_map(|s| Some((s, self.bound.get(&Self::key(s))?))).collect();
+            stages.iter().filter(|s| s.count > 0).filter_map(|s| Some((s, self.bound.get(&key(s))?))).collect();
         let dispatch = |pass: &mut wgpu::ComputePass, bound: &Bound| {
             pass.set_pipeline(&bound.pipeline.pipeline);
             pass.set_bind_group(1, &bound.buffers, &[]);
@@ -242,6 +236,14 @@ impl Gpu {
     }
 }
 
+/// What makes a stage different from the other stages of its plan.
+fn key(stage: &Stage) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    (stage.kernel.shader, stage.first, stage.count, &stage.reads, &stage.params).hash(&mut hasher);
+    stage.writes.iter().for_each(|(buffer, _)| buffer.hash(&mut hasher));
+    hasher.finish()
+}
+
 impl Clock {
     fn new(gpu: &wgpu::Device) -> Self {
         let count = 2 * TIMED_STAGES;
@@ -265,9 +267,9 @@ impl Clock {
 impl Backend for Gpu {
     fn run(&mut self, stages: &[Stage], rows: &[Row<f64>]) {
         for stage in stages.iter().filter(|s| s.count > 0) {
-            if !self.bound.contains_key(&Self::key(stage)) {
+            if !self.bound.contains_key(&key(stage)) {
                 match Bound::new(&self.device, stage, &self.buffers) {
-                    Ok(bound) => _ = self.bound.insert(Self::key(stage), bound),
+                    Ok(bound) => _ = self.bound.insert(key(stage), bound),
                     Err(error) => return self.device.note(error.to_string()),
                 }
             }
