@@ -6,13 +6,15 @@ const LOG2_E: f32 = 1.4426950408889634;
 const SQRT_HALF: u32 = 0x3f3504f3u;
 const BIAS: u32 = 0x3f800000u;
 
-// Natural logarithm of a positive normal number.
-fn ln(x: f32) -> f32 {
+// A number as (m − 1, e) with x = m 2^e and m in [√½, √2), for positive normal numbers.
+fn fraction_exponent(x: f32) -> vec2<f32> {
     let bits = bitcast<u32>(x);
     let biased = (bits - SQRT_HALF + BIAS) >> 23u;
-    let m = bitcast<f32>(bits - (biased << 23u) + BIAS);
-    let e = f32(biased) - 127.0;
-    let f = m - 1.0;
+    return vec2<f32>(bitcast<f32>(bits - (biased << 23u) + BIAS) - 1.0, f32(biased) - 127.0);
+}
+
+// ln((1 + f) 2^e).
+fn ln_of(f: f32, e: f32) -> f32 {
     let s = f / (f + 2.0);
     let z = s * s;
     var p = 1.0 / 11.0;
@@ -24,10 +26,16 @@ fn ln(x: f32) -> f32 {
     return fma(e, LN2_HIGH, fma(s + s, p, e * LN2_LOW));
 }
 
-// ln(1 + x) for x > −1.
+// Natural logarithm of a positive normal number.
+fn ln(x: f32) -> f32 {
+    let split = fraction_exponent(x);
+    return ln_of(split.x, split.y);
+}
+
+// ln(1 + x) for x > −1. What 1 + x rounds off is not added afterwards as in Rust: compilers may take x − (u − 1) for zero.
 fn log1p(x: f32) -> f32 {
-    let u = 1.0 + x;
-    return ln(u) + (x - (u - 1.0)) / u;
+    let split = fraction_exponent(1.0 + x);
+    return ln_of(select(split.x, x, split.y == 0.0), split.y);
 }
 
 // e^x for |x| below 80.
