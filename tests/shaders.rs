@@ -194,6 +194,6 @@ fn every_twin_compiles_and_sees_what_its_stage_binds() {
         failed += usize::from(catch_unwind(|| check(&name, &stage, &buffers)).is_err());
     }
     println!("{seen:#?}");
-    assert!(seen.len() == 17, "{} kinds of stages", seen.len());
+    assert!(seen.len() == 19, "{} kinds of stages", seen.len());
     assert_eq!(failed, 0, "stages without a twin that fits; see above");
 }
