@@ -164,6 +164,9 @@ struct Done {
 }
 
 fn main() -> ExitCode {
+    // Mesa's layer that chooses a default device for windows complains on stderr where there are none; tricot opens none.
+    // SAFETY: no other thread runs yet.
+    unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) if !error.use_stderr() => return finish(&error.to_string(), 0),
