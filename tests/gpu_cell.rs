@@ -136,6 +136,7 @@ fn a_device_that_is_lost_stops_the_run_with_its_name() {
     let error = cell.advance(1.0, |_| false).unwrap_err();
     println!("{error}");
     assert!(matches!(error, Error::Device(_)) && error.to_string().contains(&device.listed().name));
+    assert!(error.to_string().contains("the device was lost"), "{error}");
     assert!(cell.alive().is_err());
     assert_eq!(error.exit_code(), 6);
 }

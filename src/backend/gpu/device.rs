@@ -7,7 +7,7 @@ use crate::kernel::shader::Text;
 use crate::kernel::stage::Stage;
 use std::collections::HashMap;
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Storage buffers that the widest stage binds.
 const STORAGE_BUFFERS: u32 = 16;
@@ -45,7 +45,14 @@ pub struct Device {
     pub(super) row_layout: wgpu::BindGroupLayout,
     /// Compiled stages, by text and entry point.
     pipelines: Mutex<HashMap<(String, &'static str), Arc<Pipeline>>>,
-    fault: Arc<Mutex<Option<String>>>,
+    faults: Arc<Mutex<Faults>>,
+}
+
+/// What went wrong first, and whether the device was lost, which tells more than what that made go wrong.
+#[derive(Default)]
+struct Faults {
+    first: Option<String>,
+    lost: Option<String>,
 }
 
 impl fmt::Debug for Device {
@@ -100,9 +107,13 @@ pub fn devices() -> Vec<Listed> {
     adapters().iter().map(list).collect()
 }
 
-/// Keeps the first fault.
-fn note(fault: &Mutex<Option<String>>, what: String) {
-    fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(what);
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A message on one line.
+fn line(message: &str) -> String {
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 impl Device {
@@ -146,10 +157,14 @@ impl Device {
             ..wgpu::DeviceDescriptor::default()
         }))
         .map_err(|e| Error::Unsupported(format!("{} cannot be opened: {e}", listed.name)))?;
-        let fault = Arc::new(Mutex::new(None));
-        let (lost, failed) = (Arc::clone(&fault), Arc::clone(&fault));
-        device.set_device_lost_callback(move |_, why| note(&lost, format!("the device was lost ({why})")));
-        device.on_uncaptured_error(Arc::new(move |error| note(&failed, error.to_string())));
+        let faults = Arc::new(Mutex::new(Faults::default()));
+        let (lost, failed) = (Arc::clone(&faults), Arc::clone(&faults));
+        device.set_device_lost_callback(move |_, why| {
+            locked(&lost).lost.get_or_insert(format!("the device was lost: {}", line(&why)));
+        });
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            locked(&failed).first.get_or_insert(line(&error.to_string()));
+        }));
         let row_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("row"),
             entries: &[wgpu::BindGroupLayoutEntry {
@@ -163,7 +178,7 @@ impl Device {
                 count: None,
             }],
         });
-        let device = Self { device, queue, listed, limits, row_layout, pipelines: Mutex::default(), fault };
+        let device = Self { device, queue, listed, limits, row_layout, pipelines: Mutex::default(), faults };
         let device = Arc::new(device);
         super::self_test(&device)?;
         Ok(device)
@@ -176,12 +191,17 @@ impl Device {
 
     /// What made the device fail, if it has.
     pub fn fault(&self) -> Option<String> {
-        let fault = self.fault.lock().unwrap_or_else(PoisonError::into_inner);
-        fault.as_ref().map(|what| format!("{}: {what}", self.listed.name))
+        if locked(&self.faults).first.is_some() {
+            // word of a loss comes with the next poll; that may fail too
+            _ = self.device.poll(wgpu::PollType::Poll);
+        }
+        let faults = locked(&self.faults);
+        let what = faults.lost.as_ref().or(faults.first.as_ref())?;
+        Some(format!("{}: {what}", self.listed.name))
     }
 
-    pub(super) fn note(&self, what: String) {
-        note(&self.fault, what);
+    pub(super) fn note(&self, what: &str) {
+        locked(&self.faults).first.get_or_insert(line(what));
     }
 
     /// Drops the device as a driver would that crashed; to test that a run ends well.
@@ -214,7 +234,7 @@ impl Device {
     pub(super) fn pipeline(&self, stage: &Stage) -> Result<Arc<Pipeline>> {
         let text = Text::of(stage)?;
         let key = (text.text.clone(), stage.kernel.shader.entry);
-        let mut known = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut known = locked(&self.pipelines);
         if let Some(pipeline) = known.get(&key) {
             return Ok(Arc::clone(pipeline));
         }

@@ -166,13 +166,13 @@ impl Gpu {
         self.flush();
         staging.map_async(wgpu::MapMode::Read, .., |_| {});
         if let Err(error) = gpu.poll(wgpu::PollType::wait_indefinitely()) {
-            self.device.note(error.to_string());
+            self.device.note(&error.to_string());
         }
         match staging.slice(..).get_mapped_range() {
             Ok(view) if self.device.fault().is_none() => view[..bytes as usize].to_vec(),
             Ok(_) => vec![0; bytes as usize],
             Err(error) => {
-                self.device.note(error.to_string());
+                self.device.note(&error.to_string());
                 vec![0; bytes as usize]
             }
         }
@@ -270,7 +270,7 @@ impl Backend for Gpu {
             if !self.bound.contains_key(&key(stage)) {
                 match Bound::new(&self.device, stage, &self.buffers) {
                     Ok(bound) => _ = self.bound.insert(key(stage), bound),
-                    Err(error) => return self.device.note(error.to_string()),
+                    Err(error) => return self.device.note(&error.to_string()),
                 }
             }
         }

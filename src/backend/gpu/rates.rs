@@ -110,7 +110,7 @@ impl Device {
                 drop(pass);
                 self.queue.submit([encoder.finish()]);
                 if let Err(error) = gpu.poll(wgpu::PollType::wait_indefinitely()) {
-                    self.note(error.to_string());
+                    self.note(&error.to_string());
                 }
                 started.elapsed().as_secs_f64()
             };
