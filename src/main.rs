@@ -27,6 +27,7 @@ Examples:
   tricot check cases/unit_cell_shear.json
   tricot run cases/unit_cell_shear.json -o results/cell
   tricot run cases/unit_cell_shear.json --set steps.2.shear.angle_deg=30 --set fabric.friction=0.3
+  tricot run cases/unit_cell_shear.json -o results/cell --resume
   tricot picture results/cell
   tricot schema > case.schema.json
 
@@ -57,6 +58,12 @@ enum Command {
         /// Use a folder that holds results: they are moved to DIR/previous-N
         #[arg(long)]
         force: bool,
+        /// Go on from the last checkpoint in the folder of the results, to the same bits as without the stop
+        #[arg(long, conflicts_with_all = ["force", "from"])]
+        resume: bool,
+        /// Start from a checkpoint that another run left at the end of a load step: DIR/state/STEP-N-NAME.state
+        #[arg(long, value_name = "STATE")]
+        from: Option<PathBuf>,
         /// No progress bar
         #[arg(short, long)]
         quiet: bool,
@@ -155,16 +162,20 @@ fn main() -> ExitCode {
 
 fn perform(command: Command) -> Result<Done> {
     let text = match command {
-        Command::Run { case, output, precision, threads, force, quiet } => {
+        Command::Run { case, output, precision, threads, force, resume, from, quiet } => {
             let loaded = case.read()?;
             let options = run::Options {
                 output: output.unwrap_or_else(|| directory::default(&case.case)),
                 precision: precision.map(Into::into),
                 threads: threads.map(usize::from),
                 force,
+                resume,
+                from,
                 quiet,
             };
-            directory::check(&options.output, force)?;
+            if !resume {
+                directory::check(&options.output, force)?;
+            }
             let outcome = run::run(&loaded, &options)?;
             let code = if outcome.interrupted { INTERRUPTED } else { 0 };
             return Ok(Done { text: outcome.to_string(), code });

@@ -36,7 +36,7 @@ fn coarse() -> Loaded {
 }
 
 fn options(output: PathBuf, threads: usize) -> Options {
-    Options { output, precision: None, threads: Some(threads), force: false, quiet: true }
+    Options { output, precision: None, threads: Some(threads), force: false, resume: false, from: None, quiet: true }
 }
 
 fn ran() -> (TempDir, Outcome) {

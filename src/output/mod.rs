@@ -4,8 +4,10 @@
 //! - [`vtu`]: frames and their collection, [`vtu_read`] reads them back; [`table`]: CSV files;
 //! - [`picture`] renders a frame: [`scene`] turns it into triangles, [`raster`] draws those into a depth buffer and lights
 //!   them, [`image`] holds pixels, with letters from [`text`] and colours from [`colour`];
+//! - [`checkpoint`]: the state of a run in one file, to go on from;
 //! - [`mod@file`]: how a file is replaced as a whole or not at all.
 
+pub mod checkpoint;
 pub mod colour;
 pub mod directory;
 pub mod file;
