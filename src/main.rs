@@ -29,6 +29,7 @@ Examples:
   tricot run cases/unit_cell_shear.json --set steps.2.shear.angle_deg=30 --set fabric.friction=0.3
   tricot run cases/unit_cell_shear.json -o results/cell --resume
   tricot picture results/cell
+  tricot report results/cell
   tricot schema > case.schema.json
 
 Exit codes:
@@ -89,6 +90,15 @@ enum Command {
         /// That of a fabric file instead
         #[arg(long)]
         fabric: bool,
+    },
+    /// Put the results of a run on one page of HTML that stands by itself.
+    Report {
+        /// Folder of a run
+        #[arg(value_name = "DIR")]
+        source: PathBuf,
+        /// The page [default: report.html in the folder]
+        #[arg(short, long, value_name = "FILE")]
+        output: Option<PathBuf>,
     },
     /// Draw a frame as PNG.
     Picture {
@@ -190,6 +200,10 @@ fn perform(command: Command) -> Result<Done> {
         }
         Command::Check { case, explain } => run::check(&case.read()?, explain)?,
         Command::Schema { fabric } => schema::text(&if fabric { schema::fabric() } else { schema::case() }),
+        Command::Report { source, output } => {
+            let out = output.unwrap_or_else(|| source.join("report.html"));
+            run::report(&source, &out)?
+        }
         Command::Picture { source, field, width, output } => {
             let out = output.unwrap_or_else(|| picture_path(&source));
             run::picture(&source, field.as_deref(), width.into(), &out)?

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Files and folders that a run writes; pictures (`*.png`) and meshes (`*.vtu`, `*.inp`) come on top.
-const OWN: [&str; 15] = [
+const OWN: [&str; 18] = [
     "contacts.csv",
     "yarns_each.csv",
     "stress.csv",
@@ -21,6 +21,9 @@ const OWN: [&str; 15] = [
     "frames",
     "state",
     "pictures",
+    "shear.csv",
+    "crossings.csv",
+    "crossings.pvd",
     "stages.csv",
     "case.json",
 ];
@@ -78,7 +81,8 @@ pub fn tidy(dir: &Path, frames: usize) -> Result<()> {
         for path in list(&folder)?.into_iter().filter(|path| path.is_file()) {
             let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
             let number = name.split_once('-').filter(|(n, _)| n.len() == 4).and_then(|(n, _)| n.parse::<usize>().ok());
-            let later = (name.ends_with(".vtu") || name.ends_with(".png")) && number.is_some_and(|n| n >= frames);
+            let later =
+                [".vtu", ".vtp", ".png"].iter().any(|end| name.ends_with(end)) && number.is_some_and(|n| n >= frames);
             if later || name.ends_with(".part") {
                 fs::remove_file(&path).map_err(|e| Error::file(&path, reason(&e)))?;
             }

@@ -88,6 +88,39 @@ pub const STITCHES: &[&str] = &[
     "underlap_slack_share",
 ];
 
+/// Columns of `shear.csv`: prescribed angle, effective angles at the crossings of warp and weft, and slip of the plies there.
+pub const SHEAR: &[&str] = &[
+    "time_s",
+    "shear_angle_deg",
+    "displacement_mm",
+    "effective_angle_mean_deg",
+    "effective_angle_std_deg",
+    "effective_angle_min_deg",
+    "effective_angle_max_deg",
+    "slip_mean_mm",
+    "slip_max_mm",
+];
+
+/// Columns of `crossings.csv`: every crossing at every frame.
+pub const CROSSINGS: &[&str] = &[
+    "time_s",
+    "shear_angle_deg",
+    "warp",
+    "weft",
+    "reference_x_mm",
+    "reference_y_mm",
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "effective_angle_deg",
+    "slip_x_mm",
+    "slip_y_mm",
+    "warp_width_mm",
+    "weft_width_mm",
+    "warp_gap_mm",
+    "weft_gap_mm",
+];
+
 /// One entry of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cell<'a> {

@@ -1,14 +1,17 @@
 //! Case in, results out: owns the plan, the backend, the schedule, the measures and the outputs of one run.
 
 mod check;
+mod crossings;
 mod mesh;
 mod picture;
+mod report;
 mod resume;
 mod summary;
 
 pub use check::check;
 pub use mesh::mesh;
 pub use picture::picture;
+pub use report::report;
 
 use crate::case::Case;
 use crate::case::domain::Domain;
@@ -21,6 +24,7 @@ use crate::mesh::{Mesh, Ply};
 use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH};
 use crate::output::{directory, file, vtu};
 use crate::simulate::{Make, Simulation};
+use crossings::Crossed;
 use indicatif::{ProgressBar, ProgressStyle};
 use picture::draw;
 use resume::Start;
@@ -128,6 +132,7 @@ struct Run<'a> {
     contacts: Table,
     yarns: Option<[Table; 2]>,
     stitches: Option<Table>,
+    crossings: Option<Crossed>,
     frames: Vec<(f64, String)>,
     pictures: Vec<String>,
     curve: Vec<(f64, f64)>,
@@ -206,6 +211,7 @@ impl<'a> Run<'a> {
             contacts: table("contacts.csv", CONTACTS)?,
             yarns: if plies { Some([table("yarns.csv", YARNS)?, table("yarns_each.csv", YARNS_EACH)?]) } else { None },
             stitches: if threads { Some(table("stitches.csv", STITCHES)?) } else { None },
+            crossings: Crossed::of(&simulation.mesh, table)?,
             simulation,
             stopped,
             frames: Vec::new(),
@@ -393,7 +399,11 @@ impl<'a> Run<'a> {
         let numbers: Vec<f64> = [&[time, degrees][..], &counts, &h.penetration, &h.added_mass, &[h.dt_limit]].concat();
         self.contacts.numbers(&numbers)?;
         if let Some([table, each]) = &mut self.yarns {
-            let yarns = yarns::measure(&s.mesh, &s.frame())?;
+            let frame = s.frame();
+            let yarns = yarns::measure(&s.mesh, &frame)?;
+            if let Some(crossings) = &mut self.crossings {
+                crossings.write_row(&s.mesh, &frame, &yarns, motion * self.reach)?;
+            }
             let plies = [Ply::Warp, Ply::Weft].map(|ply| yarns::ply(&yarns, ply));
             let means = plies.map(|p| [p.width.mean, p.thickness.mean, p.gap.mean]);
             let spreads = plies.map(|p| [p.width.std, p.thickness.std, p.gap.std]);
@@ -442,6 +452,10 @@ impl<'a> Run<'a> {
         vtu::write(&s.mesh, &frame, &dir.join(&file))?;
         self.frames.push((frame.time, file));
         vtu::write_collection(&dir.join("run.pvd"), &self.frames)?;
+        if let Some(crossings) = &mut self.crossings {
+            let map = format!("frames/{:04}-{name}.vtp", self.frames.len() - 1);
+            crossings.write_frame(&s.mesh, &frame, dir, map)?;
+        }
         if self.loaded.case.output.pictures {
             let file = format!("{:04}-{name}.png", self.frames.len() - 1);
             draw(&s.mesh, &frame, &self.loaded.case.title, None, 1200, &dir.join(&file))?;

@@ -2,6 +2,7 @@
 
 use super::{Options, Place, Run};
 use crate::case::Case;
+use crate::case::steps::Step;
 use crate::error::{Error, Result};
 use crate::kernel::record::{Record, Recorded};
 use crate::output::checkpoint::{self, Checkpoint};
@@ -83,6 +84,9 @@ impl Run<'_> {
         self.place.record(record);
         self.frames.record(record);
         self.pictures.record(record);
+        if let Some(crossings) = &mut self.crossings {
+            crossings.maps.record(record);
+        }
         self.curve.record(record);
         self.last_shear.record(record);
         self.settled.record(record);
@@ -97,7 +101,8 @@ impl Run<'_> {
 
     fn tables(&mut self) -> Vec<&mut Table> {
         let tables = [&mut self.history, &mut self.energies, &mut self.stress, &mut self.contacts];
-        tables.into_iter().chain(self.yarns.iter_mut().flatten()).chain(&mut self.stitches).collect()
+        let crossings = self.crossings.iter_mut().flat_map(|c| &mut c.tables);
+        tables.into_iter().chain(self.yarns.iter_mut().flatten()).chain(&mut self.stitches).chain(crossings).collect()
     }
 
     /// Begins where `start` says: the simulation is there already, tables and frames follow.
@@ -107,7 +112,8 @@ impl Run<'_> {
             Start::From(phases) => {
                 self.place.phase = phases;
                 self.last_shear = [self.simulation.load().angle, self.simulation.energies().external];
-                if self.last_shear[0] == 0.0 {
+                let sheared = |step: &Step| matches!(step, Step::Shear { .. } | Step::Move { .. });
+                if !self.loaded.case.steps[..phases].iter().any(sheared) {
                     self.settle()?;
                 }
             }
