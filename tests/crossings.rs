@@ -121,7 +121,10 @@ fn three_zones_have_the_angles_of_the_theory() {
             near(&format!("zone {zone} at {degrees}°, mean"), spread.mean, share * angle, 1e-11);
             below(&format!("zone {zone} at {degrees}°, spread"), spread.max - spread.min, 1e-11);
         }
-        below("slip", slips(measured.iter()).max, 1e-9);
+        // where a yarn bends at the border of two zones, the mean of its section leaves the line of its middle
+        let core = || measured.iter().zip(&zones).filter(|(_, zone)| zone.is_some()).map(|(c, _)| c);
+        below("slip inside the zones", slips(core()).max, 1e-9);
+        println!("slip at their borders: up to {:.3} mm", slips(measured.iter()).max);
         let end = frame.positions.iter().zip(&mesh.nodes).max_by(|a, b| a.1[0].total_cmp(&b.1[0])).unwrap();
         let displacement = 2.0 * (end.0[0] - end.1[0]);
         near("theoretical angle at this displacement", bias.angle(displacement), angle, 1e-11);
@@ -139,9 +142,12 @@ fn plies_that_slide_lower_the_angle_and_yarns_that_part_have_none() {
     frame.positions[weft..].iter_mut().for_each(|p| p[0] += 3.0);
     let yarns = yarns::measure(&mesh, &frame).unwrap();
     let measured = crossings.measure(&mesh, &frame, &yarns).unwrap();
-    let slip = slips(measured.iter());
-    near("slip", slip.mean, 3.0, 1e-9);
-    near("largest slip", slip.max, 3.0, 1e-9);
+    let strip = Strip { centre: [0.0; 2], axis: [1.0, 0.0], length: LENGTH, width: WIDTH };
+    let inside = |at: [f64; 2]| strip.core(at, [[1.0, 1.0], [1.0, -1.0]], 8.0).is_some();
+    let core = || measured.iter().zip(&crossings.pairs).filter(|(_, p)| inside(p.reference)).map(|(c, _)| c);
+    assert!(core().count() > 200);
+    near("smallest slip inside the zones", slips(core()).min, 3.0, 1e-9);
+    near("largest slip inside the zones", slips(core()).max, 3.0, 1e-9);
     let parted = measured.iter().filter(|c| c.angle.is_nan()).count();
     println!("{parted} of {} crossings have parted", measured.len());
     assert!(parted > 0 && parted < measured.len() / 10);

@@ -10,10 +10,10 @@ pub struct Curve<'a> {
     pub points: Vec<[f64; 2]>,
 }
 
-const WIDTH: f64 = 640.0;
-const HEIGHT: f64 = 360.0;
+const WIDTH: f64 = 520.0;
+const HEIGHT: f64 = 330.0;
 /// Left, top, right and bottom of the area of the curves.
-const AREA: [f64; 4] = [64.0, 34.0, 624.0, 308.0];
+const AREA: [f64; 4] = [60.0, 32.0, 506.0, 276.0];
 /// Colours that stay apart for most eyes, and dashes that do in print.
 const COLOURS: [&str; 6] = ["#1b5e8c", "#c2571a", "#3f7d3a", "#7a4b94", "#8a6d1f", "#555b63"];
 const DASHES: [&str; 6] = ["none", "7 3", "2 3", "9 3 2 3", "4 2", "1 2"];
@@ -74,7 +74,7 @@ pub fn curves(axis: [&str; 2], curves: &[Curve]) -> Option<String> {
         let _ = write!(t, "<path class=\"c\" {style} d=\"{line}\"/>");
         let _ = write!(t, "<path class=\"c\" {style} d=\"M{pen:.1} 16h26\"/>");
         let _ = write!(t, "<text x=\"{:.1}\" y=\"20.5\">{}</text>", pen + 32.0, escaped(curve.name));
-        pen += 48.0 + 7.4 * curve.name.chars().count() as f64;
+        pen += 50.0 + 8.2 * curve.name.chars().count() as f64;
     }
     t.push_str("</svg>");
     Some(t)
@@ -89,7 +89,7 @@ pub fn map(name: &str, points: &[[f64; 3]]) -> Option<String> {
     let (wide, tall): (f64, f64) = (x1 - x0, y1 - y0);
     let spacing = (wide.max(1.0) * tall.max(1.0) / known.len() as f64).sqrt();
     let (wide, tall) = (wide + 2.0 * spacing, tall + 2.0 * spacing);
-    let scale = (WIDTH / wide).min(420.0 / tall);
+    let scale = (WIDTH / wide).min(400.0 / tall);
     let (left, height) = (0.5 * (WIDTH - scale * wide), scale * tall + 44.0);
     let radius = (0.45 * spacing * scale).clamp(1.5, 16.0);
     let mut t =
@@ -111,23 +111,23 @@ pub fn map(name: &str, points: &[[f64; 3]]) -> Option<String> {
         let _ = write!(
             t,
             "<rect x=\"{:.1}\" y=\"{bar:.1}\" width=\"5.2\" height=\"10\" fill=\"{colour}\"/>",
-            170.0 + 5.0 * f64::from(k)
+            110.0 + 5.0 * f64::from(k)
         );
     }
     let ends = [low, high];
-    let _ = write!(t, "<text x=\"162\" y=\"{:.1}\" class=\"e\">{}</text>", bar + 9.5, label(low, &ends));
-    let _ = write!(t, "<text x=\"478\" y=\"{:.1}\">{}</text>", bar + 9.5, label(high, &ends));
-    let _ = write!(t, "<text x=\"320\" y=\"{:.1}\" class=\"m\">{}</text></svg>", bar + 27.0, escaped(name));
+    let _ = write!(t, "<text x=\"102\" y=\"{:.1}\" class=\"e\">{}</text>", bar + 9.5, label(low, &ends));
+    let _ = write!(t, "<text x=\"418\" y=\"{:.1}\">{}</text>", bar + 9.5, label(high, &ends));
+    let _ = write!(t, "<text x=\"260\" y=\"{:.1}\" class=\"m\">{}</text></svg>", bar + 27.0, escaped(name));
     Some(t)
 }
 
-/// Five to ten round values that enclose a range.
+/// Five to ten round values that enclose a range, but for a tenth of a step at its low end.
 fn ticks((low, high): (f64, f64)) -> Vec<f64> {
     let rough = (high - low) / 6.0;
     let power = 10f64.powf(rough.log10().floor());
     let step =
         [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= rough * (1.0 - 1e-9)).unwrap_or(rough);
-    let (first, last) = ((low / step + 1e-9).floor() as i64, (high / step - 1e-9).ceil() as i64);
+    let (first, last) = ((low / step + 0.1).floor() as i64, (high / step - 1e-9).ceil() as i64);
     (first..=last.max(first + 1)).map(|i| i as f64 * step).collect()
 }
 
@@ -138,7 +138,7 @@ fn label(value: f64, all: &[f64]) -> String {
     if value == 0.0 {
         return "0".into();
     }
-    if largest >= 1e5 || largest < 1e-3 {
+    if !(1e-3..1e5).contains(&largest) {
         return format!("{value:.1e}").replace('-', "−");
     }
     let digits = if step > 0.0 { (-step.log10()).ceil().clamp(0.0, 6.0) as usize } else { 3 };

@@ -39,11 +39,21 @@ pub fn report(dir: &Path, out: &Path) -> Result<String> {
     let title = results.case["title"].as_str().unwrap_or("a run of tricot").to_owned();
     let mut page = Page::new(&title);
     results.head(&mut page);
-    results.pictures(&mut page)?;
+    let pictures = results.pictures();
+    if let Some((last, _)) = pictures.split_last() {
+        page.heading("Both faces at the end");
+        page.picture(&dir.join(last), last)?;
+    }
     results.sizes(&mut page)?;
     results.curves(&mut page)?;
     results.crossings(&mut page)?;
     results.table(&mut page);
+    if let Some((_, before @ [_, ..])) = pictures.split_last() {
+        page.heading("Both faces before");
+        page.raw("<div class=\"charts\">");
+        before.iter().try_for_each(|name| page.picture(&dir.join(name), name))?;
+        page.raw("</div>");
+    }
     results.case(&mut page);
     let text = page.finish(&title);
     file::replace(out, |w| w.write_all(text.as_bytes()))?;
@@ -169,15 +179,10 @@ impl Results<'_> {
         found
     }
 
-    fn pictures(&self, page: &mut Page) -> Result<()> {
+    /// Pictures that are there, in the order of their frames.
+    fn pictures(&self) -> Vec<&str> {
         let pictures = self.summary["pictures"].as_array().map_or(&[][..], Vec::as_slice);
-        let named: Vec<&str> =
-            pictures.iter().filter_map(Value::as_str).filter(|n| self.dir.join(n).is_file()).collect();
-        if named.is_empty() {
-            return Ok(());
-        }
-        page.heading("Both faces");
-        named.iter().rev().try_for_each(|name| page.picture(&self.dir.join(name), name))
+        pictures.iter().filter_map(Value::as_str).filter(|name| self.dir.join(name).is_file()).collect()
     }
 
     /// Sizes of yarns before shear and at the end, beside those of the real fabric where they are known.
@@ -218,7 +223,7 @@ impl Results<'_> {
                     .map(|(column, name)| Curve { name, points: self.points(table, axis, column) })
                     .collect();
                 if let Some(svg) = chart::curves([axis.label, unit], &curves) {
-                    page.figure(title, &svg, &format!("{unit} over {}. {caption}", axis.label));
+                    page.figure(&format!("{title}, {unit}"), &svg, caption);
                 }
             };
         let history = &self.history;
@@ -275,7 +280,14 @@ impl Results<'_> {
                 ("tension_max_n", "largest"),
             ];
             chart(&stitches, &OVER_TIME, "Tension of the stitch", "N", &tensions, "Weighted by length.");
-            chart(&stitches, &OVER_TIME, "Slack", "share", &[("slack_share", "share of slack thread")], "");
+            chart(
+                &stitches,
+                &OVER_TIME,
+                "Slack",
+                "share",
+                &[("slack_share", "share of slack thread")],
+                "By length, below 0.02 N.",
+            );
         }
         let energies = [("e_internal_mj", "internal"), ("e_kinetic_mj", "kinetic")];
         chart(history, &OVER_TIME, "Energies", "mJ", &energies, "Strain energy of yarns and threads; kinetic energy.");
@@ -365,7 +377,7 @@ impl Results<'_> {
 /// A number of a table with five digits.
 fn short(cell: &str) -> String {
     match cell.parse::<f64>() {
-        Ok(x) if x == 0.0 => "0".into(),
+        Ok(0.0) => "0".into(),
         Ok(x) if !x.is_finite() => "–".into(),
         Ok(x) if (1e-3..1e5).contains(&x.abs()) => {
             let digits = (4 - x.abs().log10().floor() as i32).max(0) as usize;

@@ -4,7 +4,7 @@ use super::{Energies, Health, Simulation, StressMean};
 use crate::error::{Error, Result};
 use crate::kernel::buffer::{Buffer, Initial};
 use crate::kernel::record::{Record, Recorded};
-use crate::plan::Capacity;
+use crate::plan::{self, Capacity};
 use crate::schedule::Load;
 
 /// Lists of a search, filled from nothing whenever there is one.
@@ -112,7 +112,9 @@ impl Simulation {
         let mut capacity = Capacity::default();
         capacity.record(&mut record);
         if capacity != self.capacity {
-            self.grow(capacity)?;
+            self.model = plan::build(&self.case, self.friction, &self.mesh, capacity)?;
+            self.backend = self.make.backend(&self.model);
+            self.capacity = capacity;
         }
         let changing = self.changing();
         let own = changing.iter().map(|b| (self.model.plan.buffers[b.0].name, self.backend.bytes(*b).len()));
