@@ -44,9 +44,9 @@
 //! | [`conditions`] | prescribed motion |
 //! | [`plan`] | the scene as buffers and stages; reading it is reading the algorithm |
 //! | [`backend`] | runs stages: the CPU, with threads and registers of any width; a GPU, with the WGSL twins of the kernels |
-//! | [`measure`] | widths, thicknesses, gaps, tensions, shear force |
+//! | [`measure`] | widths, thicknesses, gaps, crossings, zones, tensions, shear force |
 //! | [`schedule`] | load steps as smooth functions of time |
-//! | [`output`] | frames, tables, pictures |
+//! | [`output`] | frames, tables, maps, pictures, pages, checkpoints |
 //! | [`simulate`] | a scene in time: steps, contact searches, energies, guards |
 //! | [`run`] | a case with its files: what the program calls |
 //!

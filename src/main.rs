@@ -27,7 +27,9 @@ Examples:
   tricot check cases/unit_cell_shear.json
   tricot run cases/unit_cell_shear.json -o results/cell
   tricot run cases/unit_cell_shear.json --set steps.2.shear.angle_deg=30 --set fabric.friction=0.3
+  tricot run cases/unit_cell_shear.json -o results/cell --resume
   tricot picture results/cell
+  tricot report results/cell
   tricot schema > case.schema.json
 
 Exit codes:
@@ -64,6 +66,12 @@ enum Command {
         /// Use a folder that holds results: they are moved to DIR/previous-N
         #[arg(long)]
         force: bool,
+        /// Go on from the last checkpoint in the folder of the results, to the same bits as without the stop
+        #[arg(long, conflicts_with_all = ["force", "from"])]
+        resume: bool,
+        /// Start from a checkpoint that another run left at the end of a load step: DIR/state/STEP-N-NAME.state
+        #[arg(long, value_name = "STATE")]
+        from: Option<PathBuf>,
         /// No progress bar
         #[arg(short, long)]
         quiet: bool,
@@ -92,6 +100,15 @@ enum Command {
     },
     /// List the adapters that --backend gpu can use, with their limits.
     Devices,
+    /// Put the results of a run on one page of HTML that stands by itself.
+    Report {
+        /// Folder of a run
+        #[arg(value_name = "DIR")]
+        source: PathBuf,
+        /// The page [default: report.html in the folder]
+        #[arg(short, long, value_name = "FILE")]
+        output: Option<PathBuf>,
+    },
     /// Draw a frame as PNG.
     Picture {
         /// Folder of a run (its last frame is drawn), or a frame (.vtu)
@@ -184,7 +201,7 @@ fn main() -> ExitCode {
 
 fn perform(command: Command) -> Result<Done> {
     let text = match command {
-        Command::Run { case, output, precision, threads, backend, adapter, force, quiet } => {
+        Command::Run { case, output, precision, threads, backend, adapter, force, resume, from, quiet } => {
             let loaded = case.read()?;
             let options = run::Options {
                 output: output.unwrap_or_else(|| directory::default(&case.case)),
@@ -193,9 +210,13 @@ fn perform(command: Command) -> Result<Done> {
                 machine: backend.into(),
                 adapter,
                 force,
+                resume,
+                from,
                 quiet,
             };
-            directory::check(&options.output, force)?;
+            if !resume {
+                directory::check(&options.output, force)?;
+            }
             let outcome = run::run(&loaded, &options)?;
             let code = if outcome.interrupted { INTERRUPTED } else { 0 };
             return Ok(Done { text: outcome.to_string(), code });
@@ -211,6 +232,10 @@ fn perform(command: Command) -> Result<Done> {
         Command::Check { case, explain } => run::check(&case.read()?, explain)?,
         Command::Devices => run::devices(),
         Command::Schema { fabric } => schema::text(&if fabric { schema::fabric() } else { schema::case() }),
+        Command::Report { source, output } => {
+            let out = output.unwrap_or_else(|| source.join("report.html"));
+            run::report(&source, &out)?
+        }
         Command::Picture { source, field, width, output } => {
             let out = output.unwrap_or_else(|| picture_path(&source));
             run::picture(&source, field.as_deref(), width.into(), &out)?

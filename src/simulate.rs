@@ -6,6 +6,7 @@
 
 mod guards;
 mod ledger;
+mod snapshot;
 mod state;
 
 pub use ledger::Energies;

@@ -43,6 +43,8 @@ fn options(output: PathBuf, threads: usize) -> Options {
         machine: Machine::Cpu,
         adapter: String::new(),
         force: false,
+        resume: false,
+        from: None,
         quiet: true,
     }
 }

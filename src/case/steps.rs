@@ -130,10 +130,20 @@ pub struct Output {
     pub frames_per_step: usize,
     /// Whether pictures are rendered of the frames. Default true.
     pub pictures: bool,
+    /// Seconds of wall time between two checkpoints, which `--resume` goes on from; there is one at the end of every load step
+    /// besides. `null` for none at all. Default 300.
+    #[schemars(range(min = 0, max = 1_000_000))]
+    pub checkpoint_wall_s: Option<f64>,
 }
 
 impl Default for Output {
     fn default() -> Self {
-        Self { rows_per_step: 200, frames_at_deg: vec![25.0], frames_per_step: 0, pictures: true }
+        Self {
+            rows_per_step: 200,
+            frames_at_deg: vec![25.0],
+            frames_per_step: 0,
+            pictures: true,
+            checkpoint_wall_s: Some(300.0),
+        }
     }
 }

@@ -1,4 +1,5 @@
-//! What both backends share: scalars and lanes, elementary functions, positions, buffers, stages and plans.
+//! What both backends share: scalars and lanes, elementary functions, positions, buffers, stages and plans, records of host
+//! state.
 //! A kernel is written once over [`lane::Lane`] and runs as f32 or f64, one item or a whole register at a time.
 
 pub mod buffer;
@@ -7,6 +8,7 @@ pub mod lane;
 pub mod math;
 pub mod node;
 pub mod position;
+pub mod record;
 pub mod row;
 pub mod shader;
 pub mod stage;

@@ -1,9 +1,11 @@
-//! What is read off a deformed state: sizes of yarns, tension of the stitch, and the relations between shear angle and force.
+//! What is read off a deformed state: sizes of yarns, crossings of the plies, tension of the stitch, and the relations between shear angle and force.
 //! Measures return plain values; they write nothing.
 
+pub mod crossings;
 pub mod shear;
 pub mod stitches;
 pub mod yarns;
+pub mod zones;
 
 /// Mean, extremes and standard deviation of some samples; all NaN when there are none.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -96,21 +96,21 @@ impl Bias {
     /// linear between samples and as 0 at 0, so F_nor(γ/2) only involves samples up to γ itself: one sweep from small to
     /// large angles solves the implicit equation, and nothing is left to iterate.
     pub fn normalised(&self, samples: &[(f64, f64)]) -> Result<Vec<f64>> {
-        let mut known = vec![(0.0, 0.0)];
-        for &(angle, force) in samples {
-            let (last, _) = known[known.len() - 1];
-            if !(angle > last && angle < FRAC_PI_2 && force.is_finite()) {
-                let what = format!("bias curve, angle {angle} rad with force {force} N");
-                return Err(Error::geometry(
-                    what,
-                    format!("angles must rise (last: {last}) and stay below 90 degrees"),
-                ));
+        let mut curve = self.curve();
+        let point = |&(angle, force): &(f64, f64)| {
+            let (last, _) = curve.known[curve.known.len() - 1];
+            if angle > last && angle < FRAC_PI_2 && force.is_finite() {
+                return Ok(curve.push(angle, force));
             }
-            let [own, half, lever] = self.coefficients(angle);
-            let [own_share, rest] = halfway(&known, angle);
-            known.push((angle, (force * lever - half * rest) / (own + half * own_share)));
-        }
-        Ok(known.into_iter().skip(1).map(|(_, f)| f).collect())
+            let what = format!("bias curve, angle {angle} rad with force {force} N");
+            Err(Error::geometry(what, format!("angles must rise (last: {last}) and stay below 90 degrees")))
+        };
+        samples.iter().map(point).collect()
+    }
+
+    /// A curve of F_nor to be filled sample by sample.
+    pub fn curve(self) -> BiasCurve {
+        BiasCurve { bias: self, known: vec![(0.0, 0.0)] }
     }
 
     /// Factors of F_nor(γ), F_nor(γ/2) and F_m in Eq. 19, mm, mm and 1.
@@ -118,6 +118,29 @@ impl Bias {
         let (s, c) = (0.5 * angle).sin_cos();
         let Self { height, width } = self;
         [(2.0 * height - 3.0 * width) * angle.cos(), width * c, (height / width - 1.0) * (c - s)]
+    }
+}
+
+/// F_nor of a bias test, sample by sample: what a run knows while it goes on.
+#[derive(Debug, Clone)]
+pub struct BiasCurve {
+    bias: Bias,
+    known: Vec<(f64, f64)>,
+}
+
+impl BiasCurve {
+    /// F_nor, N/mm, at an angle (rad) and machine force (N). A measured angle may stand still or fall back for a moment:
+    /// NaN unless it is above all before, and below 90°.
+    pub fn push(&mut self, angle: f64, force: f64) -> f64 {
+        let (last, _) = self.known[self.known.len() - 1];
+        if !(angle > last && angle < FRAC_PI_2 && force.is_finite()) {
+            return f64::NAN;
+        }
+        let [own, half, lever] = self.bias.coefficients(angle);
+        let [own_share, rest] = halfway(&self.known, angle);
+        let f = (force * lever - half * rest) / (own + half * own_share);
+        self.known.push((angle, f));
+        f
     }
 }
 
@@ -198,6 +221,12 @@ mod tests {
         }
         for (f, (angle, _)) in bias.normalised(&samples).unwrap().iter().zip(&samples) {
             assert!((f - 0.1 * angle).abs() < 1e-14);
+        }
+        let mut curve = bias.curve();
+        assert!(curve.push(-0.01, 0.0).is_nan() && curve.push(0.0, 1.0).is_nan());
+        for &(angle, force) in &samples {
+            assert!((curve.push(angle, force) - 0.1 * angle).abs() < 1e-14);
+            assert!(curve.push(0.9 * angle, force).is_nan(), "an angle that falls back leaves no trace");
         }
         samples.reverse();
         assert!(bias.normalised(&samples).is_err());

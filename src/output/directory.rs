@@ -1,4 +1,5 @@
-//! Where results go, and what happens to results that are already there. Nothing is ever deleted.
+//! Where results go, and what happens to results that are already there. Nothing is ever deleted but what a stopped run
+//! wrote behind the checkpoint that it is resumed from.
 
 use crate::case::parse::reason;
 use crate::error::{Error, Result};
@@ -6,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Files and folders that a run writes; pictures (`*.png`) and meshes (`*.vtu`, `*.inp`) come on top.
-const OWN: [&str; 15] = [
+const OWN: [&str; 18] = [
     "contacts.csv",
     "yarns_each.csv",
     "stress.csv",
@@ -20,6 +21,9 @@ const OWN: [&str; 15] = [
     "frames",
     "state",
     "pictures",
+    "shear.csv",
+    "crossings.csv",
+    "crossings.pvd",
     "stages.csv",
     "case.json",
 ];
@@ -67,6 +71,22 @@ pub fn prepare(dir: &Path, force: bool) -> Result<()> {
     for path in own {
         let target = aside.join(path.file_name().unwrap_or_default());
         fs::rename(&path, &target).map_err(|e| Error::file(&path, format!("cannot be moved aside: {}", reason(&e))))?;
+    }
+    Ok(())
+}
+
+/// Removes what a stopped run left behind its checkpoint: half files, and frames and pictures from number `frames` on.
+pub fn tidy(dir: &Path, frames: usize) -> Result<()> {
+    for folder in ["", "frames", "state"].map(|name| dir.join(name)) {
+        for path in list(&folder)?.into_iter().filter(|path| path.is_file()) {
+            let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+            let number = name.split_once('-').filter(|(n, _)| n.len() == 4).and_then(|(n, _)| n.parse::<usize>().ok());
+            let later =
+                [".vtu", ".vtp", ".png"].iter().any(|end| name.ends_with(end)) && number.is_some_and(|n| n >= frames);
+            if later || name.ends_with(".part") {
+                fs::remove_file(&path).map_err(|e| Error::file(&path, reason(&e)))?;
+            }
+        }
     }
     Ok(())
 }

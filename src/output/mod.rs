@@ -1,15 +1,23 @@
 //! What a run leaves on disk: frames for ParaView, tables and pictures. Everything is written from a [`Mesh`](crate::mesh::Mesh)
 //! and a [`Frame`](crate::mesh::frame::Frame) or from plain numbers; nothing here computes a result.
 //!
-//! - [`vtu`]: frames and their collection, [`vtu_read`] reads them back; [`table`]: CSV files;
+//! - [`vtu`]: frames and their collection, [`vtu_read`] reads them back; [`table`]: CSV files,
+//!   [`columns`] reads them back; [`map`]: points with values;
 //! - [`picture`] renders a frame: [`scene`] turns it into triangles, [`raster`] draws those into a depth buffer and lights
 //!   them, [`image`] holds pixels, with letters from [`text`] and colours from [`colour`];
+//! - [`page`]: a page of HTML that stands by itself, with charts from [`chart`];
+//! - [`checkpoint`]: the state of a run in one file, to go on from;
 //! - [`mod@file`]: how a file is replaced as a whole or not at all.
 
+pub mod chart;
+pub mod checkpoint;
 pub mod colour;
+pub mod columns;
 pub mod directory;
 pub mod file;
 pub mod image;
+pub mod map;
+pub mod page;
 pub mod picture;
 pub mod raster;
 pub mod scene;

@@ -4,8 +4,8 @@
 
 use crate::error::{Error, Result};
 use std::fmt::Write as _;
-use std::fs::File;
-use std::io::Write;
+use std::fs::{File, OpenOptions};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Columns of `history.csv`.
@@ -88,6 +88,39 @@ pub const STITCHES: &[&str] = &[
     "underlap_slack_share",
 ];
 
+/// Columns of `shear.csv`: prescribed angle, effective angles at the crossings of warp and weft, and slip of the plies there.
+pub const SHEAR: &[&str] = &[
+    "time_s",
+    "shear_angle_deg",
+    "displacement_mm",
+    "effective_angle_mean_deg",
+    "effective_angle_std_deg",
+    "effective_angle_min_deg",
+    "effective_angle_max_deg",
+    "slip_mean_mm",
+    "slip_max_mm",
+];
+
+/// Columns of `crossings.csv`: every crossing at every frame.
+pub const CROSSINGS: &[&str] = &[
+    "time_s",
+    "shear_angle_deg",
+    "warp",
+    "weft",
+    "reference_x_mm",
+    "reference_y_mm",
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "effective_angle_deg",
+    "slip_x_mm",
+    "slip_y_mm",
+    "warp_width_mm",
+    "weft_width_mm",
+    "warp_gap_mm",
+    "weft_gap_mm",
+];
+
 /// One entry of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cell<'a> {
@@ -115,16 +148,48 @@ pub struct Table {
     file: File,
     columns: usize,
     line: String,
+    /// Bytes so far.
+    len: u64,
 }
 
 impl Table {
     /// Starts a table, replacing any old one.
     pub fn create(path: &Path, header: &[&str]) -> Result<Self> {
         let file = File::create(path).map_err(|e| Error::file(path, e))?;
-        let mut table = Self { path: path.to_path_buf(), file, columns: header.len(), line: String::new() };
+        let mut table = Self { path: path.to_path_buf(), file, columns: header.len(), line: String::new(), len: 0 };
         let names: Vec<Cell> = header.iter().map(|&name| name.into()).collect();
         table.row(&names)?;
         Ok(table)
+    }
+
+    /// Opens a table that a run left, to go on behind its last row.
+    pub fn open(path: &Path, columns: usize) -> Result<Self> {
+        let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(|e| Error::file(path, e))?;
+        let len = file.seek(SeekFrom::End(0)).map_err(|e| Error::file(path, e))?;
+        Ok(Self { path: path.to_path_buf(), file, columns, line: String::new(), len })
+    }
+
+    /// Bytes so far, all of them on the disk.
+    pub fn settled(&mut self) -> Result<u64> {
+        self.file.sync_data().map_err(|e| Error::file(&self.path, e))?;
+        Ok(self.len)
+    }
+
+    /// Refuses a table with fewer bytes than it had.
+    pub fn check_length(&self, len: u64) -> Result<()> {
+        if self.len >= len {
+            return Ok(());
+        }
+        let message =
+            format!("holds {} bytes, but {len} when the checkpoint was written: it has been changed", self.len);
+        Err(Error::file(&self.path, message))
+    }
+
+    /// Drops all rows behind the first `len` bytes.
+    pub fn cut(&mut self, len: u64) -> Result<()> {
+        let cut = self.file.set_len(len).and_then(|()| self.file.seek(SeekFrom::End(0)));
+        self.len = cut.map_err(|e| Error::file(&self.path, e))?;
+        Ok(())
     }
 
     /// Writes a row: one cell a column.
@@ -147,7 +212,9 @@ impl Table {
         }
         self.line.push('\n');
         // One write per row: a reader never sees half a row but when the disk is full.
-        self.file.write_all(self.line.as_bytes()).map_err(|e| Error::file(&self.path, e))
+        self.file.write_all(self.line.as_bytes()).map_err(|e| Error::file(&self.path, e))?;
+        self.len += self.line.len() as u64;
+        Ok(())
     }
 
     /// Writes a row of numbers.

@@ -270,7 +270,7 @@ fn unit(v: [f64; 3]) -> [f64; 3] {
 }
 
 /// One inline array: a header of the sizes of its blocks, then the blocks, each part in base64.
-fn array<T: bytemuck::NoUninit>(
+pub(super) fn array<T: bytemuck::NoUninit>(
     w: &mut dyn Write,
     kind: &str,
     name: &str,
@@ -296,7 +296,7 @@ fn deflated(bytes: &[u8]) -> io::Result<Vec<u8>> {
     encoder.finish()
 }
 
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('"', "&quot;").replace('<', "&lt;").replace('>', "&gt;")
 }
 

@@ -1,15 +1,19 @@
 //! Case in, results out: owns the plan, the backend, the schedule, the measures and the outputs of one run.
 
 mod check;
+mod crossings;
 mod devices;
 mod mesh;
 mod picture;
+mod report;
+mod resume;
 mod summary;
 
 pub use check::check;
 pub use devices::devices;
 pub use mesh::mesh;
 pub use picture::picture;
+pub use report::report;
 
 use crate::backend::gpu::{self, Device};
 use crate::case::Case;
@@ -23,8 +27,10 @@ use crate::mesh::{Mesh, Ply};
 use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH};
 use crate::output::{directory, file, vtu};
 use crate::simulate::{Make, Simulation};
+use crossings::Crossed;
 use indicatif::{ProgressBar, ProgressStyle};
 use picture::draw;
+use resume::Start;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -49,6 +55,10 @@ pub struct Options {
     pub adapter: String,
     /// Move earlier results in the folder aside.
     pub force: bool,
+    /// Go on from the last checkpoint in the folder.
+    pub resume: bool,
+    /// Start from a checkpoint that another run left at the end of a load step.
+    pub from: Option<PathBuf>,
     /// No progress.
     pub quiet: bool,
 }
@@ -119,14 +129,18 @@ pub fn run(loaded: &Loaded, options: &Options) -> Result<Outcome> {
     if let Some(precision) = options.precision {
         loaded.case.integration.precision = precision;
     }
-    let simulation = simulation(&loaded, make(loaded.case.integration.precision, options)?)?;
-    directory::prepare(&options.output, options.force)?;
-    write_case(&loaded.case, &options.output)?;
+    let mut simulation = simulation(&loaded, make(loaded.case.integration.precision, options)?)?;
+    let start = Start::of(&loaded.case, options, &mut simulation)?;
+    if !matches!(start, Start::Resumed(..)) {
+        directory::prepare(&options.output, options.force)?;
+        write_case(&loaded.case, &options.output)?;
+    }
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
     // only the first run of a process can be interrupted: the handler cannot be replaced
     let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
     let mut run = Run::new(&loaded, options, simulation, stopped)?;
+    run.take_up(start)?;
     let result = run.go();
     run.finish(result)
 }
@@ -143,20 +157,34 @@ struct Run<'a> {
     contacts: Table,
     yarns: Option<[Table; 2]>,
     stitches: Option<Table>,
+    crossings: Option<Crossed>,
     frames: Vec<(f64, String)>,
-    pictures: Vec<PathBuf>,
+    pictures: Vec<String>,
     curve: Vec<(f64, f64)>,
     /// Largest prescribed displacement, mm.
     reach: f64,
     /// Shear angle (rad) and external work (mJ) at the last row.
     last_shear: [f64; 2],
-    settled: Option<yarns::Sizes>,
-    settled_weft: Option<yarns::Sizes>,
+    /// Mean width, thickness and gap of warp and weft before shear, mm.
+    settled: Option<[[f64; 3]; 2]>,
     worst_balance: f64,
     worst_kinetic: f64,
     largest_added: [f64; 2],
     dt_range: [f64; 2],
+    place: Place,
+    /// When the next checkpoint is due.
+    due: Option<Instant>,
+    /// Wall time of the runs that this one goes on from, s.
+    wall_before: f64,
     started: Instant,
+}
+
+/// How far a run has come: complete load steps, complete rows of the next one, and frames at angles in it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Place {
+    phase: usize,
+    row: usize,
+    angles: usize,
 }
 
 /// Largest displacement that a domain prescribes, mm.
@@ -195,20 +223,20 @@ impl<'a> Run<'a> {
         let threads = !mesh.threads.is_empty();
         let folder = dir.join("frames");
         std::fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, e))?;
+        let table = |name: &str, header: &[&str]| {
+            let path = dir.join(name);
+            if options.resume { Table::open(&path, header.len()) } else { Table::create(&path, header) }
+        };
         Ok(Self {
             loaded,
             options,
-            history: Table::create(&dir.join("history.csv"), HISTORY)?,
-            energies: Table::create(&dir.join("energies.csv"), &energies)?,
-            stress: Table::create(&dir.join("stress.csv"), &STRESS)?,
-            contacts: Table::create(&dir.join("contacts.csv"), CONTACTS)?,
-            yarns: if plies {
-                let all = Table::create(&dir.join("yarns.csv"), YARNS)?;
-                Some([all, Table::create(&dir.join("yarns_each.csv"), YARNS_EACH)?])
-            } else {
-                None
-            },
-            stitches: if threads { Some(Table::create(&dir.join("stitches.csv"), STITCHES)?) } else { None },
+            history: table("history.csv", HISTORY)?,
+            energies: table("energies.csv", &energies)?,
+            stress: table("stress.csv", &STRESS)?,
+            contacts: table("contacts.csv", CONTACTS)?,
+            yarns: if plies { Some([table("yarns.csv", YARNS)?, table("yarns_each.csv", YARNS_EACH)?]) } else { None },
+            stitches: if threads { Some(table("stitches.csv", STITCHES)?) } else { None },
+            crossings: Crossed::of(&simulation.mesh, table)?,
             simulation,
             stopped,
             frames: Vec::new(),
@@ -217,43 +245,47 @@ impl<'a> Run<'a> {
             reach: reach(&loaded.case.domain),
             last_shear: [0.0; 2],
             settled: None,
-            settled_weft: None,
             worst_balance: 0.0,
             worst_kinetic: 0.0,
             largest_added: [0.0; 2],
             dt_range: [f64::INFINITY, 0.0],
+            place: Place::default(),
+            due: None,
+            wall_before: 0.0,
             started: Instant::now(),
         })
     }
 
-    /// All load steps.
+    /// All load steps, or those that are left.
     fn go(&mut self) -> Result<()> {
         let output = &self.loaded.case.output;
         let phases = self.simulation.schedule.phases().to_vec();
         let bar = self.bar();
         self.simulation.advance(0.0, |_| false)?;
-        self.write_frame("start")?;
-        for (number, (phase, step)) in phases.iter().zip(&self.loaded.case.steps).enumerate() {
+        if self.frames.is_empty() {
+            self.write_frame("start")?;
+            self.save(None)?;
+        }
+        self.wait();
+        for (number, (phase, step)) in phases.iter().zip(&self.loaded.case.steps).enumerate().skip(self.place.phase) {
             let mut angles = match step {
                 Step::Shear { .. } => output.frames_at_deg.clone(),
                 _ => Vec::new(),
             };
             angles.sort_by(f64::total_cmp);
-            let before = self.simulation.load().angle.to_degrees();
-            angles.retain(|a| {
-                *a > before.abs() && *a < self.simulation.schedule.load(phase.end).angle.to_degrees().abs()
-            });
+            let [before, after] =
+                [phase.start, phase.end].map(|t| self.simulation.schedule.load(t).angle.to_degrees().abs());
+            angles.retain(|a| *a > before && *a < after);
             let rows = output.rows_per_step.max(1);
-            for row in 1..=rows {
+            for row in self.place.row + 1..=rows {
                 let until = phase.start + (phase.end - phase.start) * row as f64 / rows as f64;
-                let stopped = Arc::clone(&self.stopped);
-                self.simulation.advance(until, |_| stopped.load(Ordering::Relaxed))?;
+                let arrived = self.reach(until)?;
                 self.write_row(phase.name)?;
                 self.tell(&bar, phase.name);
                 let angle = self.simulation.load().angle.to_degrees().abs();
-                while angles.first().is_some_and(|a| angle >= *a) {
-                    let name = format!("{:.0}deg", angles.remove(0));
-                    self.write_frame(&name)?;
+                while angles.get(self.place.angles).is_some_and(|a| angle >= *a) {
+                    self.write_frame(&format!("{:.0}deg", angles[self.place.angles]))?;
+                    self.place.angles += 1;
                 }
                 if output.frames_per_step > 0
                     && row < rows
@@ -261,21 +293,54 @@ impl<'a> Run<'a> {
                 {
                     self.write_frame(&format!("{}-{}-{row}", number + 1, phase.name))?;
                 }
-                if self.stopped.load(Ordering::Relaxed) {
+                self.place.row = row;
+                let stopped = self.stopped.load(Ordering::Relaxed);
+                if arrived && (stopped || self.is_due()) {
+                    self.save(None)?;
+                }
+                if stopped {
                     bar.finish_and_clear();
                     return self.write_frame("interrupted");
                 }
             }
-            if !matches!(step, Step::Shear { .. } | Step::Move { .. }) && self.yarns.is_some() {
-                let frame = self.simulation.frame();
-                self.simulation.alive()?;
-                let yarns = yarns::measure(&self.simulation.mesh, &frame)?;
-                self.settled = Some(yarns::ply(&yarns, Ply::Warp));
-                self.settled_weft = Some(yarns::ply(&yarns, Ply::Weft));
+            if !matches!(step, Step::Shear { .. } | Step::Move { .. }) {
+                self.settle()?;
             }
-            self.write_frame(&format!("{}-{}", number + 1, phase.name))?;
+            let name = format!("{}-{}", number + 1, phase.name);
+            self.write_frame(&name)?;
+            self.place = Place { phase: number + 1, ..Place::default() };
+            self.save(Some(&name))?;
         }
         bar.finish_and_clear();
+        Ok(())
+    }
+
+    /// Goes on to a time, with checkpoints on the way; false if the user stopped it before.
+    fn reach(&mut self, until: f64) -> Result<bool> {
+        loop {
+            let (stopped, due) = (Arc::clone(&self.stopped), self.due);
+            let pause =
+                |_: &Simulation| stopped.load(Ordering::Relaxed) || due.is_some_and(|due| Instant::now() >= due);
+            self.simulation.advance(until, pause)?;
+            if self.simulation.time() >= until * (1.0 - 1e-12) {
+                return Ok(true);
+            }
+            self.save(None)?;
+            if self.stopped.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+        }
+    }
+
+    /// Sizes of yarns before shear, for the last lines.
+    fn settle(&mut self) -> Result<()> {
+        if self.yarns.is_some() {
+            let frame = self.simulation.frame();
+            self.simulation.alive()?;
+            let yarns = yarns::measure(&self.simulation.mesh, &frame)?;
+            let means = |p: yarns::Sizes| [p.width.mean, p.thickness.mean, p.gap.mean];
+            self.settled = Some([Ply::Warp, Ply::Weft].map(|ply| means(yarns::ply(&yarns, ply))));
+        }
         Ok(())
     }
 
@@ -365,6 +430,9 @@ impl<'a> Run<'a> {
             let frame = s.frame();
             s.alive()?;
             let yarns = yarns::measure(&s.mesh, &frame)?;
+            if let Some(crossings) = &mut self.crossings {
+                crossings.write_row(&s.mesh, &frame, &yarns, motion * self.reach)?;
+            }
             let plies = [Ply::Warp, Ply::Weft].map(|ply| yarns::ply(&yarns, ply));
             let means = plies.map(|p| [p.width.mean, p.thickness.mean, p.gap.mean]);
             let spreads = plies.map(|p| [p.width.std, p.thickness.std, p.gap.std]);
@@ -416,10 +484,14 @@ impl<'a> Run<'a> {
         vtu::write(&s.mesh, &frame, &dir.join(&file))?;
         self.frames.push((frame.time, file));
         vtu::write_collection(&dir.join("run.pvd"), &self.frames)?;
+        if let Some(crossings) = &mut self.crossings {
+            let map = format!("frames/{:04}-{name}.vtp", self.frames.len() - 1);
+            crossings.write_frame(&s.mesh, &frame, dir, map)?;
+        }
         if self.loaded.case.output.pictures {
-            let path = dir.join(format!("{:04}-{name}.png", self.frames.len() - 1));
-            draw(&s.mesh, &frame, &self.loaded.case.title, None, 1200, &path)?;
-            self.pictures.push(path);
+            let file = format!("{:04}-{name}.png", self.frames.len() - 1);
+            draw(&s.mesh, &frame, &self.loaded.case.title, None, 1200, &dir.join(&file))?;
+            self.pictures.push(file);
         }
         Ok(())
     }

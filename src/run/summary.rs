@@ -34,7 +34,7 @@ impl Run<'_> {
             "dt_largest_s": self.dt_range[1],
             "dt_limit_s": h.dt_limit,
             "contact_searches": s.searches(),
-            "wall_s": self.started.elapsed().as_secs_f64(),
+            "wall_s": self.wall(),
             "stage_wall_s": s.backend().timings().into_iter().map(|(name, t)| json!({"stage": name, "s": t})).collect::<Vec<_>>(),
             "added_mass": {
                 "floor_solids": floor(0..first),
@@ -46,6 +46,7 @@ impl Run<'_> {
             "worst_kinetic_over_internal_in_shear": self.worst_kinetic,
             "energies_mj": e.columns().into_iter().map(|(name, value)| (name.to_owned(), json!(value))).collect::<serde_json::Map<_, _>>(),
             "state_hash": hash,
+            "pictures": self.pictures,
             "frames": self.frames.iter().map(|(time, file)| json!({"time_s": time, "file": file})).collect::<Vec<_>>(),
         });
         let path = self.options.output.join("summary.json");
@@ -57,7 +58,7 @@ impl Run<'_> {
         let s = &self.simulation;
         let (e, h) = (s.energies(), s.health());
         let mut t = String::new();
-        let wall = self.started.elapsed().as_secs_f64();
+        let wall = self.wall();
         // writing to a String does not fail
         let _ = writeln!(t, "{}: {verdict}", self.loaded.case.title);
         let _ = writeln!(
@@ -77,17 +78,13 @@ impl Run<'_> {
             self.dt_range[1],
             s.searches()
         );
-        for (name, sizes, target) in [
-            ("warp", &self.settled, "4.59 ± 0.13 / 0.38 ± 0.06 / 0.39 ± 0.10"),
-            ("weft", &self.settled_weft, "2.08 ± 0.08 / 0.38 ± 0.04 / 0.40 ± 0.04"),
-        ] {
-            if let Some(p) = sizes {
-                let _ = writeln!(
-                    t,
-                    "{name}       width / thickness / gap {:.2} / {:.2} / {:.2} mm before shear (PX35 tomography {target})",
-                    p.width.mean, p.thickness.mean, p.gap.mean
-                );
-            }
+        let targets =
+            [("warp", "4.59 ± 0.13 / 0.38 ± 0.06 / 0.39 ± 0.10"), ("weft", "2.08 ± 0.08 / 0.38 ± 0.04 / 0.40 ± 0.04")];
+        for ((name, target), [width, thickness, gap]) in targets.into_iter().zip(self.settled.into_iter().flatten()) {
+            let _ = writeln!(
+                t,
+                "{name}       width / thickness / gap {width:.2} / {thickness:.2} / {gap:.2} mm before shear (PX35 tomography {target})"
+            );
         }
         if let Ok(tension) = stitches::measure(&s.mesh, &s.tensions())
             && !s.mesh.threads.is_empty()
@@ -127,7 +124,10 @@ impl Run<'_> {
             100.0 * self.largest_added[1],
             s.state_hash()
         );
-        let picture = self.pictures.last().map_or(String::new(), |p| format!("; picture {}", p.display()));
+        let picture = self
+            .pictures
+            .last()
+            .map_or(String::new(), |p| format!("; picture {}", self.options.output.join(p).display()));
         let _ = write!(t, "results    {}{picture}", self.options.output.display());
         t
     }

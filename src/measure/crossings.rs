@@ -1,0 +1,332 @@
+//! Crossings of warp and weft: how far the plies have sheared there, how far they have slipped, and the gaps beside them.
+//!
+//! The mid-line of a yarn joins the means of its sections. In the reference state every pair of mid-lines that cross in
+//! the plane (x, y) marks one material point on each yarn. Later:
+//! - the position is where the two mid-lines cross now, midway between them in z;
+//! - the effective shear angle is the angle between the mid-lines in the reference state less that now. The direction of
+//!   a mid-line at a section is that from the section before to the section after, linear in between;
+//! - slip is the distance in the plane between the two material points;
+//! - widths and gaps are those of the nearest stations ([`yarns`](super::yarns)).
+//!
+//! Without slip the effective angle of trellis shear is its γ, and slip is zero.
+
+use super::Spread;
+use super::yarns::Yarn;
+use crate::error::{Error, Result};
+use crate::mesh::frame::Frame;
+use crate::mesh::{Block, Mesh, Ply};
+
+/// Periodic images that are looked at, in cells to each side.
+const REACH: i32 = 2;
+/// Share of a segment by which crossings may lie outside, so that rounding loses none at a joint.
+const MARGIN: f64 = 1e-9;
+
+/// A pair of yarns that cross in the reference state.
+#[derive(Debug, Clone)]
+pub struct Pair {
+    /// Indices of the blocks.
+    pub warp: usize,
+    pub weft: usize,
+    /// Where they cross in the reference state, mm.
+    pub reference: [f64; 2],
+    /// Image of the warp, in periods, where it crosses the weft.
+    image: [i32; 2],
+    /// Places along warp and weft, in slices.
+    at: [f64; 2],
+    /// Reference directions with a part along the axis, as signs on those of the mid-lines.
+    signs: [f64; 2],
+    /// Which way warp and weft are turned against each other, and the angle of [`turn`], in the reference state.
+    side: f64,
+    rest: f64,
+}
+
+/// A crossing in a deformed state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// Where the mid-lines cross, mm; NaN if they do no longer.
+    pub position: [f64; 3],
+    /// Effective shear angle, rad; NaN if the mid-lines cross no longer.
+    pub angle: f64,
+    /// Way of the weft's material point from the warp's, mm.
+    pub slip: [f64; 2],
+    /// Width and gap of warp and weft at their nearest stations, mm.
+    pub width: [f64; 2],
+    pub gap: [f64; 2],
+}
+
+/// All crossings of a mesh, in the order of its warps, then its wefts.
+#[derive(Debug, Clone)]
+pub struct Crossings {
+    pub pairs: Vec<Pair>,
+}
+
+impl Crossings {
+    /// Crossings of a mesh. Shear is positive where it turns the yarns towards `axis`: the direction of the pull, or the
+    /// diagonal (1, 1) of a cell.
+    pub fn of(mesh: &Mesh, axis: [f64; 2]) -> Self {
+        let frame = Frame { gradient: [[1.0, 0.0], [0.0, 1.0]], positions: mesh.nodes.clone(), ..Frame::default() };
+        let lines = midlines(mesh, &frame);
+        let mut pairs = Vec::new();
+        for (warp, weft) in candidates(mesh) {
+            let hits = hits([&lines[warp], &lines[weft]], mesh, &frame);
+            let Some(Hit { image, at, place }) = hits.into_iter().min_by(|a, b| a.at[1].total_cmp(&b.at[1])) else {
+                continue;
+            };
+            let directions = [lines[warp].direction(at[0]), lines[weft].direction(at[1])];
+            let signs = directions.map(|d| if dot(d, axis) < 0.0 { -1.0 } else { 1.0 });
+            let side = (signs[0] * signs[1] * cross(directions[0], directions[1])).signum();
+            let rest = turn(directions, signs, side);
+            pairs.push(Pair { warp, weft, reference: place, image, at, signs, side, rest });
+        }
+        Self { pairs }
+    }
+
+    /// Every crossing in a deformed state; `yarns` are the sizes of its yarns.
+    ///
+    /// # Errors
+    /// A frame or yarns of another mesh.
+    pub fn measure(&self, mesh: &Mesh, frame: &Frame, yarns: &[Yarn]) -> Result<Vec<Crossing>> {
+        frame.check(mesh)?;
+        if yarns.len() != mesh.blocks.len() {
+            let message = format!("sizes of {} yarns where the mesh has {}", yarns.len(), mesh.blocks.len());
+            return Err(Error::geometry("crossings", message));
+        }
+        let lines = midlines(mesh, frame);
+        let period = mesh.period.unwrap_or_default();
+        let crossing = |pair: &Pair| {
+            let both = [&lines[pair.warp], &lines[pair.weft]];
+            let [x, y, _] = frame.shift(period, pair.image);
+            let (a, b) = (both[0].point(pair.at[0]), both[1].point(pair.at[1]));
+            let slip = [b[0] - a[0] - x, b[1] - a[1] - y];
+            let off = |hit: &Hit| (hit.place[0] - b[0] + 0.5 * slip[0]).hypot(hit.place[1] - b[1] + 0.5 * slip[1]);
+            let hit = hits(both, mesh, frame).into_iter().min_by(|p, q| off(p).total_cmp(&off(q)));
+            let now = hit.as_ref().map_or(pair.at, |h| h.at);
+            let stations = [(pair.warp, now[0]), (pair.weft, now[1])];
+            let nearest = stations.map(|(block, at)| (&yarns[block], station(&mesh.blocks[block], at)));
+            let size =
+                |values: fn(&Yarn) -> &Vec<f64>| nearest.map(|(y, s)| values(y).get(s).copied().unwrap_or(f64::NAN));
+            let (position, angle) = hit.map_or(([f64::NAN; 3], f64::NAN), |Hit { at, place, .. }| {
+                let directions = [both[0].direction(at[0]), both[1].direction(at[1])];
+                let height = 0.5 * (both[0].point(at[0])[2] + both[1].point(at[1])[2]);
+                ([place[0], place[1], height], turn(directions, pair.signs, pair.side) - pair.rest)
+            });
+            Crossing { position, angle, slip, width: size(|y| &y.width), gap: size(|y| &y.gap) }
+        };
+        Ok(self.pairs.iter().map(crossing).collect())
+    }
+}
+
+impl Crossing {
+    /// Size of the slip, mm.
+    pub fn slipped(&self) -> f64 {
+        self.slip[0].hypot(self.slip[1])
+    }
+}
+
+/// Spread of the effective shear angle, rad.
+pub fn angles<'a>(crossings: impl Iterator<Item = &'a Crossing> + Clone) -> Spread {
+    Spread::of(crossings.map(|c| c.angle))
+}
+
+/// Spread of the size of the slip, mm.
+pub fn slips<'a>(crossings: impl Iterator<Item = &'a Crossing> + Clone) -> Spread {
+    Spread::of(crossings.map(Crossing::slipped))
+}
+
+/// All warps with all wefts.
+fn candidates(mesh: &Mesh) -> impl Iterator<Item = (usize, usize)> {
+    let of = move |ply: Ply| (0..mesh.blocks.len()).filter(move |&b| mesh.blocks[b].ply == ply);
+    of(Ply::Warp).flat_map(move |warp| of(Ply::Weft).map(move |weft| (warp, weft)))
+}
+
+/// 90° less the angle between two directions, once signs have made them point along the axis.
+fn turn([a, b]: [[f64; 2]; 2], [p, q]: [f64; 2], side: f64) -> f64 {
+    (p * q * dot(a, b)).atan2(side * p * q * cross(a, b))
+}
+
+/// Index of the station nearest to a place along a block, among those that yarns are measured at.
+fn station(block: &Block, at: f64) -> usize {
+    let nearest = at.round().max(0.0) as usize;
+    match block.wrap {
+        Some(_) => nearest % block.slices,
+        None => nearest.clamp(1, block.slices.max(2) - 1) - 1,
+    }
+}
+
+/// A mid-line at slice boundaries 0 ..= slices, mm.
+struct Midline {
+    points: Vec<[f64; 3]>,
+    /// Not of unit length.
+    directions: Vec<[f64; 2]>,
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+fn midlines(mesh: &Mesh, frame: &Frame) -> Vec<Midline> {
+    mesh.blocks.iter().map(|block| Midline::of(mesh, frame, block)).collect()
+}
+
+impl Midline {
+    fn of(mesh: &Mesh, frame: &Frame, block: &Block) -> Self {
+        let count = block.lines() as f64;
+        let section = |s: usize| {
+            let nodes = (0..=block.layers).flat_map(|k| (0..=block.columns).map(move |j| block.node(s, j, k)));
+            let sum = nodes.fold([0.0; 3], |sum: [f64; 3], seen| {
+                let p = frame.position(mesh, seen);
+                [0, 1, 2].map(|k| sum[k] + p[k])
+            });
+            sum.map(|x| x / count)
+        };
+        let points: Vec<[f64; 3]> = (0..=block.slices).map(section).collect();
+        let last = block.slices;
+        let along = |a: usize, b: usize| [points[b][0] - points[a][0], points[b][1] - points[a][1]];
+        let direction = |s: usize| match block.wrap {
+            // across the seam, the section before the first is the last but one, one turn back
+            Some(_) if s == 0 || s == last => {
+                let (start, end) = (along(0, 1), along(last - 1, last));
+                [start[0] + end[0], start[1] + end[1]]
+            }
+            _ => along(s.saturating_sub(1), (s + 1).min(last)),
+        };
+        let directions = (0..=last).map(direction).collect();
+        let extreme = |pick: fn(f64, f64) -> f64| [0, 1].map(|k| points.iter().map(|p| p[k]).fold(f64::NAN, pick));
+        Self { low: extreme(f64::min), high: extreme(f64::max), directions, points }
+    }
+
+    /// Slice and share of it at a place along the line.
+    fn split(&self, at: f64) -> (usize, f64) {
+        let slice = (at.max(0.0) as usize).min(self.points.len() - 2);
+        (slice, at - slice as f64)
+    }
+
+    fn point(&self, at: f64) -> [f64; 3] {
+        let (s, t) = self.split(at);
+        [0, 1, 2].map(|k| self.points[s][k] + t * (self.points[s + 1][k] - self.points[s][k]))
+    }
+
+    /// Unit direction at a place.
+    fn direction(&self, at: f64) -> [f64; 2] {
+        let (s, t) = self.split(at);
+        let [a, b] = [self.directions[s], self.directions[s + 1]].map(unit);
+        unit([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])])
+    }
+}
+
+/// Where two mid-lines cross.
+struct Hit {
+    /// Image of the first line.
+    image: [i32; 2],
+    /// Places along both lines, in slices.
+    at: [f64; 2],
+    place: [f64; 2],
+}
+
+/// All crossings of a warp, in the images around, with a weft.
+fn hits([warp, weft]: [&Midline; 2], mesh: &Mesh, frame: &Frame) -> Vec<Hit> {
+    let reach = if mesh.period.is_some() { REACH } else { 0 };
+    let images = (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| [i, j]));
+    let mut found = Vec::new();
+    for image in images {
+        let [x, y, _] = frame.shift(mesh.period.unwrap_or_default(), image);
+        let shift = [x, y];
+        let apart = (0..2).any(|k| warp.high[k] + shift[k] < weft.low[k] || warp.low[k] + shift[k] > weft.high[k]);
+        if apart {
+            continue;
+        }
+        for (s, a) in warp.points.windows(2).enumerate() {
+            let [p, r] = [[a[0][0] + x, a[0][1] + y], [a[1][0] - a[0][0], a[1][1] - a[0][1]]];
+            for (t, b) in weft.points.windows(2).enumerate() {
+                let u = [b[1][0] - b[0][0], b[1][1] - b[0][1]];
+                let between = [b[0][0] - p[0], b[0][1] - p[1]];
+                let area = cross(r, u);
+                let [m, n] = [cross(between, u) / area, cross(between, r) / area];
+                let inside = -MARGIN..=1.0 + MARGIN;
+                if inside.contains(&m) && inside.contains(&n) {
+                    let place = [p[0] + m * r[0], p[1] + m * r[1]];
+                    found.push(Hit { image, at: [s as f64 + m, t as f64 + n], place });
+                }
+            }
+        }
+    }
+    found
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+fn unit([x, y]: [f64; 2]) -> [f64; 2] {
+    let length = x.hypot(y);
+    [x / length, y / length]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::shear::{angle_of, trellis};
+    use crate::measure::yarns;
+    use crate::mesh::sample;
+
+    fn measured(gradient: [[f64; 2]; 2], change: impl Fn(&Mesh, &mut Frame)) -> Vec<Crossing> {
+        let mesh = sample::plies();
+        let mut frame = sample::frame(&mesh, gradient);
+        change(&mesh, &mut frame);
+        let yarns = yarns::measure(&mesh, &frame).unwrap();
+        Crossings::of(&mesh, [1.0, 1.0]).measure(&mesh, &frame, &yarns).unwrap()
+    }
+
+    #[test]
+    fn every_warp_crosses_every_weft_once_a_cell() {
+        let mesh = sample::plies();
+        let pairs = Crossings::of(&mesh, [1.0, 1.0]).pairs;
+        assert_eq!(pairs.len(), 8);
+        for p in pairs {
+            let wanted = [-5.0 + 5.0 * p.warp as f64, -3.75 + 2.5 * (p.weft - 2) as f64];
+            let off: Vec<f64> = (0..2).map(|k| (p.reference[k] - wanted[k]).rem_euclid(10.0)).collect();
+            assert!(off.iter().all(|o| *o < 1e-9 || *o > 10.0 - 1e-9), "{:?} {wanted:?}", p.reference);
+        }
+    }
+
+    #[test]
+    fn an_affine_field_gives_its_angle_at_every_crossing_and_no_slip() {
+        let sheared = [-60.0_f64, -5.0, 0.0, 25.0, 70.0].map(|d| trellis(d.to_radians()));
+        for gradient in sheared.into_iter().chain([[[1.02, 0.4], [-0.1, 0.9]], [[1.0, 0.3], [0.0, 1.0]]]) {
+            let crossings = measured(gradient, |_, _| {});
+            assert_eq!(crossings.len(), 8);
+            for c in crossings {
+                assert!((c.angle - angle_of(gradient)).abs() < 1e-12, "{c:?}");
+                assert!(c.slipped() < 1e-12 && c.position.iter().all(|x| x.is_finite()));
+            }
+        }
+        let flat = measured(trellis(0.0), |_, _| {});
+        let sizes = |c: &Crossing| [c.width, c.gap].concat();
+        let wanted = [4.59, 2.08, 0.41, 0.42];
+        assert!(flat.iter().all(|c| sizes(c).iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12)));
+    }
+
+    #[test]
+    fn a_ply_that_slides_slips_by_that_and_keeps_its_angle() {
+        let slide = |mesh: &Mesh, frame: &mut Frame| {
+            let first = mesh.blocks.iter().find(|b| b.ply == Ply::Weft).unwrap().first;
+            for p in &mut frame.positions[first..] {
+                *p = [p[0] + 0.3, p[1] - 0.4, p[2]];
+            }
+        };
+        for c in measured(trellis(0.5), slide) {
+            assert!((c.slipped() - 0.5).abs() < 1e-12 && (c.angle - 0.5).abs() < 1e-12);
+            assert!((c.slip[0] - 0.3).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn yarns_of_another_mesh_are_refused() {
+        let mesh = sample::plies();
+        let frame = sample::frame(&mesh, trellis(0.0));
+        let error = Crossings::of(&mesh, [1.0, 1.0]).measure(&mesh, &frame, &[]).unwrap_err();
+        assert!(error.to_string().contains("0 yarns"));
+    }
+}

@@ -1,0 +1,124 @@
+//! The three zones of a bias-extension specimen, told by which yarns the clamps hold: both at a point of zone A, one in
+//! zone B, none in zone C.
+
+use super::Spread;
+use super::crossings::Crossing;
+
+/// Zone of a point in the reference state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Zone {
+    /// Both yarns are held: no shear.
+    A,
+    /// One is held: half the shear.
+    B,
+    /// None is held: full shear.
+    C,
+}
+
+impl Zone {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::A => "A",
+            Self::B => "B",
+            Self::C => "C",
+        }
+    }
+}
+
+/// The free rectangle between two clamps, in its reference state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strip {
+    /// Centre, mm, and unit direction of the pull.
+    pub centre: [f64; 2],
+    pub axis: [f64; 2],
+    /// Length between the clamps along the axis, and width, mm.
+    pub length: f64,
+    pub width: f64,
+}
+
+impl Strip {
+    /// Zone of a point whose two yarns run along `yarns`.
+    pub fn zone(&self, point: [f64; 2], yarns: [[f64; 2]; 2]) -> Zone {
+        let held = yarns.into_iter().filter(|&yarn| self.held(point, yarn)).count();
+        [Zone::C, Zone::B, Zone::A][held]
+    }
+
+    /// Zone of a point at least `margin` (mm, along and across the pull) away from every other zone and from the edges.
+    pub fn core(&self, point: [f64; 2], yarns: [[f64; 2]; 2], margin: f64) -> Option<Zone> {
+        let zone = self.zone(point, yarns);
+        let [ax, ay] = self.axis.map(|a| a * margin);
+        let around = [[ax, ay], [-ax, -ay], [-ay, ax], [ay, -ax]].map(|[x, y]| [point[0] + x, point[1] + y]);
+        let inside = |p: [f64; 2]| {
+            let [along, across] = self.place(p);
+            along.abs() <= 0.5 * self.length && across.abs() <= 0.5 * self.width && self.zone(p, yarns) == zone
+        };
+        around.into_iter().all(inside).then_some(zone)
+    }
+
+    /// Place along and across the pull, from the centre.
+    fn place(&self, point: [f64; 2]) -> [f64; 2] {
+        let [x, y] = [point[0] - self.centre[0], point[1] - self.centre[1]];
+        let [a, b] = self.axis;
+        [a * x + b * y, a * y - b * x]
+    }
+
+    /// Whether the straight yarn through a point meets a clamp.
+    fn held(&self, point: [f64; 2], yarn: [f64; 2]) -> bool {
+        let [along, across] = self.place(point);
+        let [c, s] = [self.axis[0] * yarn[0] + self.axis[1] * yarn[1], self.axis[0] * yarn[1] - self.axis[1] * yarn[0]];
+        let meets = |clamp: f64| (across + (clamp - along) * s / c).abs() <= 0.5 * self.width;
+        meets(0.5 * self.length) || meets(-0.5 * self.length)
+    }
+}
+
+/// Spread of the effective shear angle in zones A, B and C, rad, over the crossings of which a zone is given.
+pub fn angles(crossings: &[Crossing], zones: &[Option<Zone>]) -> [Spread; 3] {
+    [Zone::A, Zone::B, Zone::C].map(|zone| {
+        let own = crossings.iter().zip(zones).filter(move |(_, z)| **z == Some(zone));
+        Spread::of(own.map(|(c, _)| c.angle))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DIAGONALS: [[f64; 2]; 2] = [[1.0, 1.0], [1.0, -1.0]];
+
+    #[test]
+    fn areas_of_the_zones_are_those_of_the_three_zone_theory() {
+        let strip = Strip { centre: [0.0; 2], axis: [1.0, 0.0], length: 240.0, width: 80.0 };
+        let mut counts = [0; 3];
+        for i in 0..480 {
+            for j in 0..160 {
+                // no point lies on a border
+                let point = [-119.75 + 0.5 * f64::from(i), -39.9 + 0.5 * f64::from(j)];
+                counts[strip.zone(point, DIAGONALS) as usize] += 1;
+            }
+        }
+        let area = counts.map(|n| 0.25 * f64::from(n));
+        // C: W(2H − 3W)/2, B: W², A: the rest
+        for (got, wanted) in area.into_iter().zip([3200.0, 6400.0, 9600.0]) {
+            assert!((got - wanted).abs() < 0.01 * wanted, "{area:?}");
+        }
+    }
+
+    #[test]
+    fn a_turned_strip_has_the_same_zones_and_cores_stay_clear_of_borders() {
+        let turned = Strip { centre: [3.0, -2.0], axis: [0.6, 0.8], length: 240.0, width: 80.0 };
+        let turn = |[x, y]: [f64; 2]| [0.6 * x - 0.8 * y, 0.8 * x + 0.6 * y];
+        let yarns = DIAGONALS.map(turn);
+        let at = |p: [f64; 2]| {
+            let [x, y] = turn(p);
+            [x + 3.0, y - 2.0]
+        };
+        let points =
+            [([0.0, 0.0], Zone::C), ([110.0, 5.0], Zone::A), ([80.0, 30.0], Zone::B), ([-100.0, -39.0], Zone::B)];
+        for (p, zone) in points {
+            assert_eq!(turned.zone(at(p), yarns), zone, "{p:?}");
+        }
+        assert_eq!(turned.core(at([0.0, 0.0]), yarns, 10.0), Some(Zone::C));
+        assert_eq!(turned.core(at([75.0, 0.0]), yarns, 10.0), None);
+        assert_eq!(turned.core(at([0.0, 35.0]), yarns, 10.0), None);
+    }
+}

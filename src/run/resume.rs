@@ -1,0 +1,171 @@
+//! Checkpoints of a run: when they are written, and how a run goes on from one.
+
+use super::{Options, Place, Run};
+use crate::case::Case;
+use crate::case::steps::Step;
+use crate::error::{Error, Result};
+use crate::kernel::record::{Record, Recorded};
+use crate::output::checkpoint::{self, Checkpoint};
+use crate::output::directory;
+use crate::output::table::Table;
+use crate::simulate::Simulation;
+use serde_json::Value;
+use std::time::{Duration, Instant};
+
+/// Where a run begins.
+pub(super) enum Start {
+    /// At rest.
+    New,
+    /// At the end of so many load steps of another run.
+    From(usize),
+    /// Where this run was when it wrote its last checkpoint: the record of the run.
+    Resumed(Vec<u8>),
+}
+
+impl Start {
+    /// What the options ask for; the simulation is then in that state. Nothing on disk is changed.
+    pub(super) fn of(case: &Case, options: &Options, simulation: &mut Simulation) -> Result<Self> {
+        let path = match &options.from {
+            Some(path) => path.clone(),
+            None if options.resume => checkpoint::latest(&options.output)?,
+            None => return Ok(Self::New),
+        };
+        let Checkpoint { header, records: [host, run], buffers } = Checkpoint::read(&path)?;
+        let here = checkpoint::through_text(&value(case)?);
+        let phases = header.phases;
+        let free = |place: &str| options.from.is_some() && may_differ(place, phases);
+        if let Some(difference) = checkpoint::difference(&here, &header.case, &free) {
+            let message = format!("belongs to another case: {difference}");
+            return Err(Error::file(&path, message));
+        }
+        simulation.restore(host, &header.buffers, &buffers).map_err(|e| Error::file(&path, e))?;
+        if !options.resume {
+            if !header.end_of_step {
+                let message = "is from the midst of a load step: --from needs one from its end (STEP-N-NAME.state)";
+                return Err(Error::file(&path, message));
+            }
+            if phases >= case.steps.len() {
+                let message = format!("the case has {} load steps, and this state is behind all of them", phases);
+                return Err(Error::file(&path, message));
+            }
+            return Ok(Self::From(phases));
+        }
+        Ok(Self::Resumed(run))
+    }
+}
+
+/// What may change between a run and another that starts from its state after `phases` load steps: names, outputs, later
+/// steps, and time integration but for what fixes the bits of the state.
+fn may_differ(place: &str, phases: usize) -> bool {
+    let later = |n: &str| n.parse::<usize>().is_ok_and(|n| n >= phases);
+    match place.split_once('.') {
+        None => matches!(place, "title" | "output"),
+        Some(("steps", n)) => later(n),
+        Some(("integration", name)) => !matches!(name, "precision" | "perturbation_quanta"),
+        Some(_) => false,
+    }
+}
+
+fn value(case: &Case) -> Result<Value> {
+    serde_json::to_value(case).map_err(|e| Error::case("case", e.to_string()))
+}
+
+impl Recorded for Place {
+    fn record(&mut self, record: &mut Record) {
+        let Self { phase, row, angles } = self;
+        [phase, row, angles].into_iter().for_each(|n| n.record(record));
+    }
+}
+
+impl Run<'_> {
+    /// Everything a run carries besides its simulation; `lengths` are those of its tables, in order.
+    fn record(&mut self, lengths: &mut Vec<u64>, record: &mut Record) {
+        lengths.record(record);
+        self.place.record(record);
+        self.frames.record(record);
+        self.pictures.record(record);
+        if let Some(crossings) = &mut self.crossings {
+            crossings.maps.record(record);
+        }
+        self.curve.record(record);
+        self.last_shear.record(record);
+        self.settled.record(record);
+        self.worst_balance.record(record);
+        self.worst_kinetic.record(record);
+        self.largest_added.record(record);
+        self.dt_range.record(record);
+        let mut wall = self.wall();
+        wall.record(record);
+        (self.wall_before, self.started) = (wall, Instant::now());
+    }
+
+    fn tables(&mut self) -> Vec<&mut Table> {
+        let tables = [&mut self.history, &mut self.energies, &mut self.stress, &mut self.contacts];
+        let crossings = self.crossings.iter_mut().flat_map(|c| &mut c.tables);
+        tables.into_iter().chain(self.yarns.iter_mut().flatten()).chain(&mut self.stitches).chain(crossings).collect()
+    }
+
+    /// Begins where `start` says: the simulation is there already, tables and frames follow.
+    pub(super) fn take_up(&mut self, start: Start) -> Result<()> {
+        match start {
+            Start::New => {}
+            Start::From(phases) => {
+                self.place.phase = phases;
+                self.last_shear = [self.simulation.load().angle, self.simulation.energies().external];
+                let sheared = |step: &Step| matches!(step, Step::Shear { .. } | Step::Move { .. });
+                if !self.loaded.case.steps[..phases].iter().any(sheared) {
+                    self.settle()?;
+                }
+            }
+            Start::Resumed(own) => {
+                let mut lengths = Vec::new();
+                let mut record = Record::read(own);
+                self.record(&mut lengths, &mut record);
+                let mut tables = self.tables();
+                if !record.complete() || lengths.len() != tables.len() {
+                    return Err(Error::file(&self.options.output, "its checkpoint was written for other tables"));
+                }
+                for (table, len) in tables.iter().zip(&lengths) {
+                    table.check_length(*len)?;
+                }
+                for (table, len) in tables.iter_mut().zip(&lengths) {
+                    table.cut(*len)?;
+                }
+                directory::tidy(&self.options.output, self.frames.len())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes a checkpoint, unless the case wants none; `end` names the load step that is complete.
+    pub(super) fn save(&mut self, end: Option<&str>) -> Result<()> {
+        if self.loaded.case.output.checkpoint_wall_s.is_none() {
+            return Ok(());
+        }
+        let mut lengths = self.tables().into_iter().map(Table::settled).collect::<Result<Vec<u64>>>()?;
+        let mut record = Record::new();
+        self.record(&mut lengths, &mut record);
+        let (host, buffers) = self.simulation.snapshot();
+        self.simulation.alive()?;
+        let case = value(&self.loaded.case)?;
+        let at = (self.simulation.step(), self.place.phase);
+        Checkpoint::new(case, at, [host, record.into_bytes()], buffers).write(&self.options.output, end)?;
+        self.wait();
+        Ok(())
+    }
+
+    /// Sets when the next checkpoint is due.
+    pub(super) fn wait(&mut self) {
+        let interval = self.loaded.case.output.checkpoint_wall_s;
+        self.due = interval.map(|seconds| Instant::now() + Duration::from_secs_f64(seconds));
+    }
+
+    pub(super) fn is_due(&self) -> bool {
+        self.due.is_some_and(|due| Instant::now() >= due)
+    }
+
+    /// Wall time so far, s, with that of the runs that this one goes on from.
+    pub(super) fn wall(&self) -> f64 {
+        self.wall_before + self.started.elapsed().as_secs_f64()
+    }
+}

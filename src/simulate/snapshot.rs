@@ -1,0 +1,147 @@
+//! The whole state of a scene as bytes, and a scene that goes on from it to the same bits.
+
+use super::{Energies, Health, Simulation, StressMean};
+use crate::error::{Error, Result};
+use crate::kernel::buffer::{Buffer, Initial};
+use crate::kernel::record::{Record, Recorded};
+use crate::plan::{self, Capacity};
+use crate::schedule::Load;
+
+/// Lists of a search, filled from nothing whenever there is one.
+const REBUILT: [&str; 2] = ["items of cells", "cells"];
+
+impl Recorded for Load {
+    fn record(&mut self, record: &mut Record) {
+        let Self { angle, thermal, radius, motion } = self;
+        [angle, thermal, radius, motion].into_iter().for_each(|x| x.record(record));
+    }
+}
+
+impl Recorded for Energies {
+    fn record(&mut self, record: &mut Record) {
+        // every field by name, so that a new one cannot be forgotten
+        let Self {
+            elongation,
+            compaction,
+            distortion,
+            shear,
+            axial,
+            bending,
+            contact,
+            kinetic,
+            kinetic_total,
+            friction,
+            contact_damping,
+            damping,
+            thermal,
+            radius,
+            external,
+            prescribed,
+            gravity,
+            inertia,
+        } = self;
+        let stored = [elongation, compaction, distortion, shear, axial, bending, contact, kinetic, kinetic_total];
+        let flows = [friction, contact_damping, damping, thermal, radius, external, prescribed, gravity, inertia];
+        stored.into_iter().chain(flows).for_each(|x| x.record(record));
+    }
+}
+
+impl Recorded for Health {
+    fn record(&mut self, record: &mut Record) {
+        let Self { min_jacobian, worst_hex, penetration, touching, balance, dt_limit, limiting_node, added_mass } =
+            self;
+        [min_jacobian, balance, dt_limit].into_iter().for_each(|x| x.record(record));
+        [worst_hex, limiting_node].into_iter().for_each(|x| x.record(record));
+        penetration.record(record);
+        touching.record(record);
+        added_mass.record(record);
+    }
+}
+
+impl Recorded for StressMean {
+    fn record(&mut self, record: &mut Record) {
+        let Self { sum, steps } = self;
+        sum.record(record);
+        steps.record(record);
+    }
+}
+
+impl Recorded for Capacity {
+    fn record(&mut self, record: &mut Record) {
+        let Self { cell, slots, beam_slots } = self;
+        [cell, slots, beam_slots].into_iter().for_each(|x| x.record(record));
+    }
+}
+
+impl Simulation {
+    /// Everything the host carries from one window of steps to the next.
+    fn record(&mut self, record: &mut Record) {
+        let numbers = [
+            &mut self.time,
+            &mut self.dt,
+            &mut self.dt_before,
+            &mut self.speed,
+            &mut self.start_energy,
+            &mut self.largest_flow,
+        ];
+        numbers.into_iter().for_each(|x| x.record(record));
+        let counts = [&mut self.step, &mut self.searches, &mut self.diagnosed, &mut self.burst];
+        counts.into_iter().for_each(|x| x.record(record));
+        self.gradient_at_search.record(record);
+        self.energies.record(record);
+        self.health.record(record);
+        self.stress.record(record);
+    }
+
+    /// State on the host and in every buffer that is no table. Take it where [`advance`](Self::advance) has returned.
+    pub fn snapshot(&mut self) -> (Vec<u8>, Vec<(&'static str, Vec<u8>)>) {
+        let mut record = Record::new();
+        self.capacity.record(&mut record);
+        self.record(&mut record);
+        let changing = self.changing().into_iter();
+        let buffers = changing.map(|b| (self.model.plan.buffers[b.0].name, self.backend.bytes(b))).collect();
+        (record.into_bytes(), buffers)
+    }
+
+    /// Replaces the state of a scene that has not begun by one from [`snapshot`](Self::snapshot).
+    ///
+    /// # Errors
+    /// A state of another mesh, other effects or another precision; the message names the buffer.
+    pub fn restore(&mut self, host: Vec<u8>, buffers: &[(String, usize)], contents: &[Vec<u8>]) -> Result<()> {
+        let mut record = Record::read(host);
+        let mut capacity = Capacity::default();
+        capacity.record(&mut record);
+        if capacity != self.capacity {
+            self.model = plan::build(&self.case, self.friction, &self.mesh, capacity)?;
+            self.backend = self.make.backend(&self.model)?;
+            self.capacity = capacity;
+        }
+        let changing = self.changing();
+        let own = changing.iter().map(|b| (self.model.plan.buffers[b.0].name, self.backend.bytes(*b).len()));
+        let (here, there) = (own.collect::<Vec<_>>(), buffers.iter().map(|(name, len)| (name.as_str(), *len)));
+        let there: Vec<_> = there.collect();
+        if let Some(at) = (0..here.len().max(there.len())).find(|i| here.get(*i) != there.get(*i)) {
+            let say =
+                |b: Option<&(&str, usize)>| b.map_or("none".into(), |(name, len)| format!("{name:?} of {len} bytes"));
+            let message = format!("buffer {at} is {} here, but {} there", say(here.get(at)), say(there.get(at)));
+            return Err(Error::geometry("a state of another scene", message));
+        }
+        self.record(&mut record);
+        if !record.complete() {
+            return Err(Error::geometry("a state of another scene", "its record on the host has another length"));
+        }
+        for (buffer, bytes) in changing.into_iter().zip(contents) {
+            self.backend.set_bytes(buffer, bytes);
+        }
+        self.ready = true;
+        Ok(())
+    }
+
+    /// Buffers that hold more than constants: what persists, and what the last steps left for tables and frames.
+    fn changing(&self) -> Vec<Buffer> {
+        let buffers = self.model.plan.buffers.iter().enumerate();
+        let changing =
+            buffers.filter(|(_, b)| (b.persistent || matches!(b.initial, Initial::Zero)) && !REBUILT.contains(&b.name));
+        changing.map(|(i, _)| Buffer(i)).collect()
+    }
+}

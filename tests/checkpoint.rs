@@ -1,0 +1,299 @@
+//! A run that is stopped goes on to the same bits; a checkpoint that is damaged or of another case is refused.
+
+mod common;
+
+use common::{advance, bare, block, loaded, neo_hookean, with};
+use serde_json::{Value, json};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::time::Duration;
+use tempfile::TempDir;
+use tricot::case::steps::Precision;
+use tricot::fabric;
+use tricot::plan::Capacity;
+use tricot::simulate::{Make, Simulation};
+
+/// A coarse cell of the shipped fabric, tightened fast so that threads and yarns touch.
+fn cell() -> Value {
+    let fabric: Value = serde_json::from_str(include_str!("../cases/fabrics/px35.json")).unwrap();
+    json!({
+        "title": "coarse cell",
+        "fabric": fabric,
+        "domain": { "cell": {} },
+        "resolution": { "warp_columns": 6, "weft_columns": 4, "slice_mm": 0.8, "beams_per_lap": 32 },
+        "steps": [
+            { "pretension": { "time_s": 1.5e-4 } },
+            { "hold": { "time_s": 2e-5 } },
+            { "shear": { "angle_deg": 3, "time_s": 1e-4 } }
+        ],
+        "integration": { "energy_tolerance": 100 },
+        "output": { "rows_per_step": 6, "frames_at_deg": [1, 2], "pictures": false, "checkpoint_wall_s": 0.02 }
+    })
+}
+
+/// Blocks that are pushed onto each other, slide and fall.
+fn blocks() -> Value {
+    let steel = neo_hookean(100.0, 0.3);
+    let low = block("low", [4, 4, 1], [[0.0, 0.0, 0.0], [2.0, 2.0, 0.5]], 1e-9, steel.clone());
+    let high = block("high", [3, 3, 1], [[0.3, 0.3, 0.502], [1.7, 1.7, 1.0]], 1e-9, steel);
+    let push =
+        json!({ "body": "high", "within": [[0.0, 0.0, 0.99], [2.0, 2.0, 1.01]], "displacement_mm": [0.2, 0.1, -0.05] });
+    let hold =
+        json!({ "body": "low", "within": [[0.0, 0.0, -0.01], [2.0, 2.0, 0.01]], "displacement_mm": [0.0, 0.0, 0.0] });
+    with(
+        bare(),
+        &[
+            ("/domain/mesh/blocks", json!([low, high])),
+            ("/domain/mesh/conditions", json!([push, hold])),
+            ("/domain/mesh/friction", json!(0.3)),
+            ("/effects/contact", json!({})),
+            ("/effects/damping", json!({})),
+            ("/integration", json!({ "dt_max_s": 1e-7, "energy_tolerance": 100 })),
+            ("/effects/gravity_mm_s2", json!([0.0, 0.0, -9810.0])),
+            ("/steps", json!([{ "move": { "time_s": 1e-4 } }])),
+        ],
+    )
+}
+
+fn simulation(case: &Value, make: Make, capacity: Capacity) -> Simulation {
+    let loaded = loaded(case);
+    let mesh = fabric::build(&loaded.case, loaded.fabric.as_ref()).unwrap();
+    Simulation::with_capacity(&loaded.case, 0.3, mesh, make, capacity).unwrap()
+}
+
+#[test]
+fn a_restored_scene_goes_on_to_the_same_bits() {
+    let tight = Capacity { cell: 12, slots: 2, beam_slots: 2 };
+    for (case, precision, capacity, end) in [
+        (cell(), Precision::F32, Capacity::default(), 2.5e-4),
+        (cell(), Precision::F32, tight, 2.5e-4),
+        (cell(), Precision::F64, Capacity::default(), 2.5e-4),
+        (blocks(), Precision::F32, Capacity::default(), 1e-4),
+    ] {
+        let make = Make { precision, threads: 1, ..Make::default() };
+        let mut whole = simulation(&case, make.clone(), capacity);
+        let mut windows = 0;
+        // in the midst of a load step, and of the rows that a run would write
+        whole
+            .advance(end, |_| {
+                windows += 1;
+                windows == 5
+            })
+            .unwrap();
+        assert!(whole.step() > 100 && !whole.done(), "{} steps", whole.step());
+        let (host, buffers) = whole.snapshot();
+        let sizes: Vec<(String, usize)> = buffers.iter().map(|(name, b)| ((*name).to_owned(), b.len())).collect();
+        let contents: Vec<Vec<u8>> = buffers.into_iter().map(|(_, b)| b).collect();
+        let mut other = simulation(&case, Make { threads: 2, ..make.clone() }, Capacity::default());
+        other.restore(host.clone(), &sizes, &contents).unwrap();
+        assert_eq!((whole.state_hash(), whole.tensions()), (other.state_hash(), other.tensions()));
+        assert_eq!((whole.energies(), whole.health()), (other.energies(), other.health()));
+        for scene in [&mut whole, &mut other] {
+            advance(scene, end);
+        }
+        println!("{} steps, {:016x}", whole.step(), whole.state_hash());
+        assert_eq!((whole.state_hash(), whole.step()), (other.state_hash(), other.step()));
+        assert_eq!((whole.energies(), whole.health()), (other.energies(), other.health()));
+        assert_eq!((whole.take_stress(), whole.reactions()), (other.take_stress(), other.reactions()));
+        assert_eq!(format!("{:?}", whole.frame()), format!("{:?}", other.frame()));
+
+        let finer = with(cell(), &[("/resolution/slice_mm", json!(0.7))]);
+        let error = simulation(&finer, make, Capacity::default()).restore(host, &sizes, &contents).unwrap_err();
+        assert!(error.to_string().contains("bytes here, but"), "{error}");
+    }
+}
+
+/// A folder with the case of [`cell`].
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("cell.json"), cell().to_string()).unwrap();
+    folder
+}
+
+/// The program on that case.
+fn program(folder: &Path, output: &str, more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tricot"));
+    command.args(["run", "--quiet", "--threads", "1", "-o"]).arg(folder.join(output)).arg(folder.join("cell.json"));
+    command.args(more);
+    command
+}
+
+fn ran(folder: &Path, output: &str, more: &[&str]) {
+    let output = program(folder, output, more).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[track_caller]
+fn refused(output: &Output) -> String {
+    let text = String::from_utf8(output.stderr.clone()).unwrap();
+    assert_eq!(output.status.code(), Some(4), "{text}");
+    assert_eq!(text.lines().count(), 1, "{text}");
+    text
+}
+
+/// Every file below a folder with its bytes.
+fn contents(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(contents(&path));
+        } else {
+            found.push((path.clone(), fs::read(&path).unwrap()));
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Everything that does not speak of wall time: names and bytes.
+fn results(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let timed = |path: &Path| path.starts_with("state") || path == Path::new("summary.json");
+    let files = contents(dir).into_iter().map(|(path, bytes)| (path.strip_prefix(dir).unwrap().to_path_buf(), bytes));
+    files.filter(|(path, _)| !timed(path)).collect()
+}
+
+fn hash(dir: &Path) -> String {
+    let summary: Value = serde_json::from_slice(&fs::read(dir.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(summary["verdict"], "finished");
+    summary["state_hash"].as_str().unwrap().to_owned()
+}
+
+#[track_caller]
+fn same(folder: &Path, a: &str, b: &str) {
+    let [a, b] = [a, b].map(|name| folder.join(name));
+    let (first, second) = (results(&a), results(&b));
+    let names = |files: &[(PathBuf, Vec<u8>)]| files.iter().map(|(path, _)| path.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&first), names(&second));
+    for ((path, a), (_, b)) in first.iter().zip(&second) {
+        assert!(a == b, "{} differs", path.display());
+    }
+    assert_eq!(hash(&a), hash(&b));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_killed_at_any_moment_goes_on_to_the_same_files() {
+    let folder = folder();
+    let folder = folder.path();
+    ran(folder, "whole", &[]);
+    let mut kills = 0;
+    for (round, wait) in [30, 45, 60, 80, 110, 150].into_iter().enumerate() {
+        let output = format!("killed-{round}");
+        let state = folder.join(&output).join("state");
+        let mut resume: &[&str] = &[];
+        for attempt in 0..200 {
+            let mut child = program(folder, &output, resume).spawn().unwrap();
+            // a run that has no checkpoint yet is no case for --resume
+            while !state.is_dir()
+                || fs::read_dir(&state).unwrap().all(|f| f.unwrap().path().extension().unwrap() != "state")
+            {
+                std::thread::sleep(Duration::from_millis(2));
+            }
+            std::thread::sleep(Duration::from_millis(wait * (1 + attempt)));
+            if child.try_wait().unwrap().is_none() {
+                child.kill().unwrap();
+                kills += 1;
+            }
+            if child.wait().unwrap().success() {
+                break;
+            }
+            resume = &["--resume"];
+        }
+        same(folder, "whole", &output);
+    }
+    println!("{kills} kills");
+    assert!(kills >= 6, "{kills} kills: the runs are too short to be stopped");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_goes_on_to_the_same_files() {
+    let folder = folder();
+    let folder = folder.path();
+    ran(folder, "whole", &[]);
+    let mut child = program(folder, "stopped", &[]).stdout(std::process::Stdio::null()).spawn().unwrap();
+    let rows = || fs::read_to_string(folder.join("stopped/history.csv")).map_or(0, |t| t.lines().count());
+    while rows() < 3 {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130), "interrupted");
+    ran(folder, "stopped", &["--resume"]);
+    same(folder, "whole", "stopped");
+    // a run that has come to its end has nothing left to do, and stays as it is
+    ran(folder, "stopped", &["--resume"]);
+    same(folder, "whole", "stopped");
+}
+
+#[test]
+fn what_cannot_be_resumed_is_named_and_nothing_is_touched() {
+    let folder = folder();
+    let folder = folder.path();
+    let fails = |output: &str, more: &[&str]| refused(&program(folder, output, more).output().unwrap());
+    assert!(fails("none", &["--resume"]).contains("no checkpoint in state/"));
+    ran(folder, "cell", &[]);
+    let dir = folder.join("cell");
+    let before = contents(&dir);
+
+    let text = fails("cell", &["--resume", "--set", "fabric.friction=0.3"]);
+    assert!(text.contains("fabric.friction is 0.3, but 0.2 in the checkpoint"), "{text}");
+    let text = fails("cell", &["--resume", "--set", "steps.2.shear.angle_deg=4"]);
+    assert!(text.contains("steps.2.shear.angle_deg is 4"), "{text}");
+    let text = fails("cell", &["--resume", "--precision", "f64"]);
+    assert!(text.contains("integration.precision is \"f64\""), "{text}");
+    assert!(before == contents(&dir), "a refused run changes nothing");
+
+    let states = contents(&dir.join("state"));
+    let last = &states.iter().find(|(p, _)| p.to_str().unwrap().ends_with("-3-shear.state")).unwrap().0;
+    let whole = fs::read(last).unwrap();
+    let mut changed = whole.clone();
+    changed[whole.len() / 2] ^= 16;
+    for bytes in [&whole[..whole.len() / 3], &[], &changed] {
+        fs::write(last, bytes).unwrap();
+        let text = fails("cell", &["--resume"]);
+        assert!(text.contains("-3-shear.state: this checkpoint is cut off or damaged"), "{text}");
+    }
+    fs::remove_file(last).unwrap();
+    let table = dir.join("yarns.csv");
+    let rows = fs::read_to_string(&table).unwrap();
+    fs::write(&table, &rows[..200]).unwrap();
+    let text = fails("cell", &["--resume"]);
+    assert!(text.contains("yarns.csv: holds 200 bytes"), "{text}");
+    fs::write(&table, &rows).unwrap();
+    let history = fs::read(dir.join("history.csv")).unwrap();
+    ran(folder, "cell", &["--resume"]);
+    assert_eq!(fs::read(dir.join("history.csv")).unwrap(), history, "no row is lost or doubled");
+}
+
+#[test]
+fn a_study_starts_from_the_end_of_a_load_step() {
+    let folder = folder();
+    let folder = folder.path();
+    ran(folder, "first", &[]);
+    let states = contents(&folder.join("first/state"));
+    let named = |end: &str| states.iter().map(|(p, _)| p.to_str().unwrap()).find(|p| p.ends_with(end)).unwrap();
+    let hold = named("-2-hold.state");
+    ran(folder, "again", &["--from", hold]);
+    assert_eq!(hash(&folder.join("first")), hash(&folder.join("again")));
+    let rows = |name: &str, file: &str| {
+        let text = fs::read_to_string(folder.join(name).join(file)).unwrap();
+        text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>()
+    };
+    for file in ["history.csv", "energies.csv", "yarns.csv", "stitches.csv", "shear.csv"] {
+        assert_eq!(rows("first", file)[12..], rows("again", file)[..], "{file}");
+    }
+    // later steps may change, what made the state may not
+    ran(folder, "other", &["--from", hold, "--set", "steps.2.shear.angle_deg=-2", "--set", "title=other"]);
+    assert!(rows("other", "history.csv").last().unwrap().contains(",shear,"));
+    let fails = |more: &[&str]| refused(&program(folder, "bad", more).output().unwrap());
+    let text = fails(&["--from", hold, "--set", "steps.1.hold.time_s=1e-5"]);
+    assert!(text.contains("steps.1.hold.time_s is 0.00001, but 0.00002 in the checkpoint"), "{text}");
+    assert!(fails(&["--from", named("-3-shear.state")]).contains("behind all of them"));
+    assert!(fails(&["--from", "none.state"]).contains("none.state"));
+    if let Some((passing, _)) = states.iter().find(|(p, _)| !p.to_str().unwrap().contains('-')) {
+        assert!(fails(&["--from", passing.to_str().unwrap()]).contains("midst of a load step"));
+    }
+    assert!(!folder.join("bad").exists());
+}
