@@ -115,11 +115,11 @@ fn add_threads(
     warps: usize,
     wefts: usize,
 ) -> Result<()> {
-    let lap: Vec<([f64; 3], Part)> = layout
-        .path()?
+    let path = layout.path()?;
+    let lap: Vec<([f64; 3], Part)> = path
         .beams(beams, fabric.stitch.radius_mm)
         .into_iter()
-        .map(|(p, part)| (p.map(quantised), part))
+        .map(|(arcs, part)| (path.line.at(arcs[0]).map(quantised), part))
         .collect();
     for i in 0..warps {
         let first = mesh.nodes.len();

@@ -15,7 +15,7 @@ use crate::case::Case;
 use crate::case::domain::{Resolution, Specimen};
 use crate::case::fabric::{Fabric, Yarn};
 use crate::error::{Error, Result};
-use crate::mesh::vector::{Vector, between, norm, sub};
+use crate::mesh::vector::{Vector, norm, sub};
 use crate::mesh::{Block, Mesh, Part, Ply, quality};
 
 /// Fewest columns of a yarn that is cut along its length, and fewest slices.
@@ -231,14 +231,15 @@ fn add_threads(mesh: &mut Mesh, cut: &Cut, layout: &Layout, fabric: &Fabric, bea
     let [threads, courses] = [(0, px), (1, py)].map(|(axis, pitch)| (cut.reach(axis) / pitch).ceil() as i64 + 1);
     let mut number = 0;
     for i in -threads..=threads {
-        let chain = (-courses..=courses).flat_map(|j| {
-            let side = if j % 2 == 0 { 1.0 } else { -1.0 };
-            let at = move |[x, y, z]: Vector| [i as f64 * px + side * x, j as f64 * py + y, z];
-            lap.iter().map(move |(p, part)| (cut.place(at(*p)), *part))
-        });
-        let mut pieces = pieces(cut, chain);
+        let at = |course: i64, arc: f64| {
+            let side = if course % 2 == 0 { 1.0 } else { -1.0 };
+            let [x, y, z] = path.line.at(arc);
+            cut.place([i as f64 * px + side * x, course as f64 * py + y, z])
+        };
+        let beams = (-courses..=courses).flat_map(|j| lap.iter().map(move |&(arcs, part)| (j, arcs, part)));
+        let mut pieces = pieces(cut, beams.map(|(j, arcs, part)| (move |arc| at(j, arc), arcs, part)));
         let length = |piece: &Piece| -> f64 { piece.nodes.windows(2).map(|p| norm(sub(p[1], p[0]))).sum() };
-        pieces.retain(|piece| length(piece) >= path.loop_length);
+        pieces.retain(|piece| piece.nodes.len() > 1 && length(piece) >= path.loop_length);
         number += usize::from(!pieces.is_empty());
         for (k, piece) in pieces.into_iter().enumerate() {
             let first = mesh.nodes.len();
@@ -257,52 +258,53 @@ struct Piece {
     parts: Vec<Part>,
 }
 
-/// Cuts a chain where it leaves the rectangle. Its last beam inside is made longer rather than followed by one shorter than
-/// half a beam.
-fn pieces(cut: &Cut, chain: impl Iterator<Item = (Vector, Part)>) -> Vec<Piece> {
-    let chain: Vec<(Vector, Part)> = chain.collect();
+/// Cuts a chain of beams, each with its curve and arc lengths on it, where it leaves the rectangle. A beam that would be
+/// less than half left is taken together with its neighbour.
+fn pieces<C: Fn(f64) -> Vector>(cut: &Cut, beams: impl Iterator<Item = (C, [f64; 2], Part)>) -> Vec<Piece> {
     let mut pieces = Vec::new();
     let mut piece = Piece::default();
-    for ends in chain.windows(2) {
-        let [(a, part), (b, _)] = [ends[0], ends[1]];
-        match [cut.holds(a), cut.holds(b)] {
+    for (curve, [from, to], part) in beams {
+        let inside = [from, to].map(|arc| cut.holds(curve(arc)));
+        match (inside[0], piece.nodes.is_empty()) {
+            (true, true) => piece.nodes.push(curve(from)),
+            // the end of the beam before lay on the very border
+            (false, false) => pieces.push(std::mem::take(&mut piece)),
+            _ => {}
+        }
+        match inside {
             [true, true] => {
-                if piece.nodes.is_empty() {
-                    piece.nodes.push(a);
-                }
-                piece.nodes.push(b);
+                piece.nodes.push(curve(to));
                 piece.parts.push(part);
             }
             [true, false] => {
-                let share = leaves(cut, a, b);
-                if share < 0.5 {
+                let border = leaves(cut, &curve, from, to);
+                if border - from < 0.5 * (to - from) {
                     piece.nodes.pop();
                 } else {
                     piece.parts.push(part);
                 }
-                piece.nodes.push(between(a, b, share));
+                piece.nodes.push(curve(border));
                 pieces.push(std::mem::take(&mut piece));
             }
             [false, true] => {
-                let share = leaves(cut, b, a);
-                piece.nodes.push(between(b, a, share));
-                if share >= 0.5 {
-                    piece.nodes.push(b);
+                let border = leaves(cut, &curve, to, from);
+                piece.nodes.push(curve(border));
+                if to - border >= 0.5 * (to - from) {
+                    piece.nodes.push(curve(to));
                     piece.parts.push(part);
                 }
             }
             [false, false] => {}
         }
     }
-    pieces.retain(|p| p.nodes.len() > 1);
     pieces
 }
 
-/// Share of the way from a point inside to one outside at which the border lies.
-fn leaves(cut: &Cut, inside: Vector, outside: Vector) -> f64 {
-    let share = |k: usize| {
-        let border = cut.half[k].copysign(outside[k]);
-        if outside[k].abs() > cut.half[k] { (border - inside[k]) / (outside[k] - inside[k]) } else { 1.0 }
-    };
-    share(0).min(share(1))
+/// Arc length at which a curve leaves the rectangle, between one inside and one outside.
+fn leaves(cut: &Cut, curve: impl Fn(f64) -> Vector, mut inside: f64, mut outside: f64) -> f64 {
+    for _ in 0..50 {
+        let middle = 0.5 * (inside + outside);
+        if cut.holds(curve(middle)) { inside = middle } else { outside = middle }
+    }
+    inside
 }

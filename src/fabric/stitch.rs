@@ -236,11 +236,11 @@ impl Layout {
 }
 
 impl Path {
-    /// First node and part of every beam of one lap.
-    pub fn beams(&self, beams: usize, radius: f64) -> Vec<(Vector, Part)> {
+    /// Arc lengths of both ends, and part, of every beam of one lap.
+    pub fn beams(&self, beams: usize, radius: f64) -> Vec<([f64; 2], Part)> {
         let part = |middle: f64| if middle < self.loop_length { Part::Loop } else { Part::Underlap };
         let ends = self.line.graded(beams, radius);
-        ends.windows(2).map(|s| (self.line.at(s[0]), part(0.5 * (s[0] + s[1])))).collect()
+        ends.windows(2).map(|s| ([s[0], s[1]], part(0.5 * (s[0] + s[1])))).collect()
     }
 }
 
