@@ -36,7 +36,7 @@
 //! | [`kernel`] | what backends share: lanes, elementary functions, positions in quanta, buffers, stages, the text of shaders |
 //! | [`case`] | what a user writes: typed JSON with units, ranges, defaults, schema and overrides |
 //! | [`mesh`] | nodes, blocks of hexahedra, threads, frames (deformed states), surfaces, quality |
-//! | [`fabric`] | from parameters to geometry: yarn sections, the path of the stitch, the cell |
+//! | [`fabric`] | from parameters to geometry: yarn sections, the path of the stitch, the cell, the specimen |
 //! | [`materials`] | constitutive laws: energy, first Piola stress, stiffness |
 //! | [`elements`] | hexahedra, beams, bending between beams |
 //! | [`contact`] | search and penalty forces with friction |

@@ -15,12 +15,13 @@ use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{Device, Gpu};
 use crate::case::Case;
+use crate::case::domain::{Clamps, Domain};
 use crate::case::steps::Precision;
 use crate::contact::status;
 use crate::contact::threads::MOST_PAIRS;
 use crate::dynamics::time_step;
 use crate::error::{Error, Result};
-use crate::kernel::buffer::Buffer;
+use crate::kernel::buffer::{Buffer, Initial};
 use crate::kernel::lane::Isa;
 use crate::kernel::row::Row;
 use crate::mesh::Mesh;
@@ -93,6 +94,9 @@ pub struct Simulation {
     largest_flow: f64,
     health: Health,
     stress: StressMean,
+    /// Time from which prescribed motion acts, s, and whether it does now.
+    hold_from: f64,
+    holds: bool,
     ready: bool,
 }
 
@@ -130,6 +134,17 @@ impl Make {
     }
 }
 
+/// Time from which the conditions of a case act, s.
+fn hold_from(case: &Case, schedule: &Schedule) -> f64 {
+    match &case.domain {
+        Domain::Specimen(specimen) if specimen.clamps == Clamps::AfterPretension => {
+            let tightening = schedule.phases().iter().find(|phase| phase.name == "pretension");
+            tightening.map_or(0.0, |phase| phase.end)
+        }
+        _ => 0.0,
+    }
+}
+
 /// Mean of V P̄ over the steps since it was last taken, N·mm.
 #[derive(Debug, Clone, Copy, Default)]
 struct StressMean {
@@ -156,6 +171,8 @@ impl Simulation {
         let schedule = Schedule::new(&case.steps, &case.effects);
         Ok(Self {
             gradient_at_search: schedule.load(0.0),
+            hold_from: hold_from(case, &schedule),
+            holds: true,
             schedule,
             backend,
             case: case.clone(),
@@ -260,6 +277,7 @@ impl Simulation {
 
     /// Some steps, then a search if the skin is used up.
     fn burst(&mut self, steps: u64) -> Result<()> {
+        self.hold();
         let mut rows = Vec::with_capacity(steps as usize);
         let mut time = self.time;
         for _ in 0..steps {
@@ -292,6 +310,23 @@ impl Simulation {
         let longer = if self.speed > CALM * before { BURST } else { 2 * self.burst };
         self.burst = longer.min(sure).clamp(BURST, WINDOW);
         Ok(())
+    }
+
+    /// Lets prescribed motion act from its time on, by the masks of its nodes.
+    fn hold(&mut self) {
+        let holds = self.time >= self.hold_from * (1.0 - 1e-12);
+        if holds == self.holds {
+            return;
+        }
+        self.holds = holds;
+        let Some(buffer) = self.model.buffers.prescribed else { return };
+        if let Initial::Uint(all) = &self.model.plan.buffers[buffer.0].initial {
+            let mut masked = all.clone();
+            if !holds {
+                masked.chunks_exact_mut(2).for_each(|condition| condition[1] = 0);
+            }
+            self.backend.set_bytes(buffer, bytemuck::cast_slice(&masked));
+        }
     }
 
     /// Runs the contact search, with larger tables if they overflow.

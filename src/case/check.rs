@@ -1,7 +1,9 @@
 //! Checks across fields that need no mesh. Ranges of single numbers are in the schema.
 
 mod cell;
+mod fabric;
 mod inline;
+mod specimen;
 
 use super::Case;
 use super::domain::Domain;
@@ -26,6 +28,7 @@ pub fn check(case: &Case, origin: &Origin) -> Result<()> {
     steps(case, origin)?;
     match &case.domain {
         Domain::Cell { warps, wefts } => cell::check(case, *warps, *wefts, origin),
+        Domain::Specimen(specimen) => specimen::check(case, specimen, origin),
         Domain::Mesh(mesh) => inline::check(case, mesh, origin),
     }
 }

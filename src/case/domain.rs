@@ -19,6 +19,8 @@ pub enum Domain {
         #[schemars(range(min = 2, max = 2000))]
         wefts: usize,
     },
+    /// A rectangle cut at an angle out of the fabric and pulled apart: the bias-extension test.
+    Specimen(Specimen),
     /// A mesh written out in the case, for verification scenes.
     Mesh(InlineMesh),
 }
@@ -28,6 +30,61 @@ fn warps() -> usize {
 }
 fn wefts() -> usize {
     4
+}
+
+/// A rectangle of fabric centred at the origin, its length along x, clamped at both ends. Nothing holds its long edges.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Specimen {
+    /// Length between the clamps, mm: H in Eqs 18 and 19 of the paper. Default 240.
+    #[schemars(range(min = 1, max = 500))]
+    pub length_mm: f64,
+    /// Width, mm: W in Eqs 18 and 19. Default 80.
+    #[schemars(range(min = 1, max = 500))]
+    pub width_mm: f64,
+    /// Angle from the length of the specimen to the warps, counter-clockwise seen from their side, degrees. Default 45.
+    #[schemars(range(min = -90, max = 90))]
+    pub warp_angle_deg: f64,
+    /// Length of fabric inside each clamp, beyond `length_mm`, mm. All its nodes are held in all directions; with 0 only
+    /// those in the cut faces are. Default 0.
+    #[schemars(range(min = 0, max = 200))]
+    pub clamp_mm: f64,
+    /// Moment from which the clamps hold. Default `start`.
+    pub clamps: Clamps,
+    /// Displacement of the clamp at x > 0, away from the other one, at the end of the `move` step, mm. Default 60.
+    #[schemars(range(min = 0, max = 200))]
+    pub displacement_mm: f64,
+}
+
+/// When clamps begin to hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Clamps {
+    /// From the start: the stitch tightens between held ends.
+    #[default]
+    Start,
+    /// From the end of the pretension step: the ends may draw in before.
+    AfterPretension,
+}
+
+impl Default for Specimen {
+    fn default() -> Self {
+        Self {
+            length_mm: 240.0,
+            width_mm: 80.0,
+            warp_angle_deg: 45.0,
+            clamp_mm: 0.0,
+            clamps: Clamps::Start,
+            displacement_mm: 60.0,
+        }
+    }
+}
+
+impl Specimen {
+    /// Half of the length of fabric, clamps included, and half of its width, mm.
+    pub fn half(&self) -> [f64; 2] {
+        [0.5 * self.length_mm + self.clamp_mm, 0.5 * self.width_mm]
+    }
 }
 
 /// Blocks of hexahedra and threads of beams, given node by node.
@@ -164,16 +221,34 @@ pub struct Resolution {
     /// Hexahedra through the thickness of a yarn. Default 2.
     #[schemars(range(min = 1, max = 100))]
     pub layers: usize,
-    /// Length of a hexahedron along the fibre, mm; rounded to a whole number over the cell. Default 0.303.
+    /// Length of a hexahedron along the fibre, mm; rounded to a whole number over the yarn. Default 0.303.
     #[schemars(range(min = 0.001, max = 50))]
     pub slice_mm: f64,
     /// Beams per lap (a loop and its underlap), graded by curvature. Default 60.
     #[schemars(range(min = 8, max = 10_000))]
     pub beams_per_lap: usize,
+    /// Everything but the layers finer by this factor: columns and beams are multiplied by it, the slice is divided. Default 1.
+    #[schemars(range(min = 0.1, max = 10))]
+    pub finer: f64,
 }
 
 impl Default for Resolution {
     fn default() -> Self {
-        Self { warp_columns: 18, weft_columns: 8, layers: 2, slice_mm: 0.303, beams_per_lap: 60 }
+        Self { warp_columns: 18, weft_columns: 8, layers: 2, slice_mm: 0.303, beams_per_lap: 60, finer: 1.0 }
+    }
+}
+
+impl Resolution {
+    /// The resolution with its factor applied.
+    pub fn refined(&self) -> Self {
+        let times = |count: usize| (count as f64 * self.finer).round() as usize;
+        Self {
+            warp_columns: times(self.warp_columns),
+            weft_columns: times(self.weft_columns),
+            layers: self.layers,
+            slice_mm: self.slice_mm / self.finer,
+            beams_per_lap: times(self.beams_per_lap),
+            finer: 1.0,
+        }
     }
 }

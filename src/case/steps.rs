@@ -34,7 +34,7 @@ pub enum Step {
         #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,
     },
-    /// The prescribed displacements of the conditions of an inline mesh grow to their full value.
+    /// The prescribed displacements of a specimen's clamp, or of the conditions of an inline mesh, grow to their full value.
     Move {
         /// Duration, s.
         #[schemars(range(min = 1e-9, max = 10))]

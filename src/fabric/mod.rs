@@ -1,9 +1,11 @@
 //! From the parameters of a case to a mesh.
 
 pub mod cell;
+mod check;
 pub mod inline;
 pub mod polyline;
 pub mod section;
+pub mod specimen;
 pub mod stitch;
 
 use crate::case::Case;
@@ -21,12 +23,12 @@ const MOST_NODES: f64 = 1e8;
 
 /// Builds the mesh of a case. `fabric` is the case's fabric, read from its file where it has one.
 pub fn build(case: &Case, fabric: Option<&Fabric>) -> Result<Mesh> {
+    let needed = |what: &str| {
+        fabric.ok_or_else(|| Error::case("fabric", format!("a {what} needs a fabric: its path, or the fabric")))
+    };
     let mesh = match &case.domain {
-        Domain::Cell { warps, wefts } => {
-            let fabric =
-                fabric.ok_or_else(|| Error::case("fabric", "a cell needs a fabric: its path, or the fabric"))?;
-            cell::build(case, fabric, *warps, *wefts)?
-        }
+        Domain::Cell { warps, wefts } => cell::build(case, needed("cell")?, *warps, *wefts)?,
+        Domain::Specimen(specimen) => specimen::build(case, needed("specimen")?, specimen)?,
         Domain::Mesh(inline) => inline::build(inline)?,
     };
     for (node, position) in mesh.nodes.iter().enumerate() {

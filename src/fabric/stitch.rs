@@ -3,10 +3,10 @@
 
 use super::polyline::Polyline;
 use super::section::{Section, smooth};
-use crate::case::fabric::{Fabric, Lap, Yarn};
+use crate::case::fabric::{Fabric, Lap, Stitch, Yarn};
 use crate::error::{Error, Result};
-use crate::mesh::Part;
 use crate::mesh::vector::{Vector, between};
+use crate::mesh::{Part, Thread, quality};
 use libm::{cos, sin};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -236,10 +236,29 @@ impl Layout {
 }
 
 impl Path {
-    /// First node and part of every beam of one lap.
-    pub fn beams(&self, beams: usize, radius: f64) -> Vec<(Vector, Part)> {
+    /// Arc lengths of both ends, and part, of every beam of one lap.
+    pub fn beams(&self, beams: usize, radius: f64) -> Vec<([f64; 2], Part)> {
         let part = |middle: f64| if middle < self.loop_length { Part::Loop } else { Part::Underlap };
         let ends = self.line.graded(beams, radius);
-        ends.windows(2).map(|s| (self.line.at(s[0]), part(0.5 * (s[0] + s[1])))).collect()
+        ends.windows(2).map(|s| ([s[0], s[1]], part(0.5 * (s[0] + s[1])))).collect()
+    }
+}
+
+/// A thread of the stitch whose nodes start at `first`, with the part of the lap that each beam belongs to; a closed chain
+/// if it has a `wrap`.
+pub fn thread(stitch: &Stitch, name: String, first: usize, wrap: Option<[i32; 2]>, parts: Vec<Part>) -> Thread {
+    Thread {
+        name,
+        first,
+        count: parts.len() + usize::from(wrap.is_none()),
+        wrap,
+        radius: stitch.radius_mm,
+        axial: stitch.young_mpa * PI * stitch.radius_mm * stitch.radius_mm,
+        bending: stitch.bending_n_mm2,
+        rest_curvature: stitch.rest_curvature,
+        linear_density: stitch.linear_density_tex * quality::TONNES_PER_MM_OF_TEX,
+        thermal_strain: stitch.thermal_strain,
+        velocity: [0.0; 3],
+        parts,
     }
 }

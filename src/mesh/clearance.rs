@@ -17,7 +17,8 @@ pub struct Clearance {
 }
 
 /// Smallest gap between any thread and the yarns of a ply, at `samples` evenly spaced points of each beam (1: its first
-/// node). Yarns are straight, so distances are measured to the polygon of their first section.
+/// node). Yarns are straight, so distances are measured to the polygon of their first section; what lies beyond both ends
+/// of an open yarn does not count.
 pub fn thread_yarn(mesh: &Mesh, ply: Ply, samples: usize) -> Option<Clearance> {
     let outlines: Vec<Outline> = mesh.blocks.iter().filter(|b| b.ply == ply).map(|b| Outline::of(mesh, b)).collect();
     let mut best: Option<Clearance> = None;
@@ -51,16 +52,32 @@ struct Outline<'a> {
     centre: [f64; 2],
     /// Half extents of the bounding box.
     half: [f64; 2],
+    /// Where an open yarn starts and ends along the fibre.
+    ends: [f64; 2],
     points: Vec<[f64; 2]>,
 }
 
 impl<'a> Outline<'a> {
     fn of(mesh: &Mesh, block: &'a Block) -> Self {
         let surface = super::surface::Surface::new(block);
-        let mut outline = Self { block, period: 0.0, centre: [0.0; 2], half: [0.0; 2], points: Vec::new() };
+        let mut outline = Self {
+            block,
+            period: 0.0,
+            centre: [0.0; 2],
+            half: [0.0; 2],
+            ends: [f64::NEG_INFINITY, f64::INFINITY],
+            points: Vec::new(),
+        };
         outline.points = (0..surface.ring()).map(|r| outline.across(mesh.position(surface.node(r, 0)))).collect();
         if let Some([lx, ly]) = mesh.period {
             outline.period = (lx * block.fibre[1]).abs() + (ly * block.fibre[0]).abs();
+        }
+        if block.wrap.is_none() {
+            let along = |r: usize, slice: usize| dot(mesh.position(surface.node(r, slice)), block.fibre);
+            outline.ends = [
+                (0..surface.ring()).map(|r| along(r, 0)).fold(f64::INFINITY, f64::min),
+                (0..surface.ring()).map(|r| along(r, block.slices)).fold(f64::NEG_INFINITY, f64::max),
+            ];
         }
         for axis in 0..2 {
             let [low, high] = outline
@@ -86,7 +103,8 @@ impl<'a> Outline<'a> {
             u -= self.period * ((u - self.centre[0]) / self.period).round();
         }
         let beyond = [(u - self.centre[0]).abs() - self.half[0], (v - self.centre[1]).abs() - self.half[1]];
-        if beyond[0].max(beyond[1]) >= limit {
+        let along = dot(p, self.block.fibre);
+        if beyond[0].max(beyond[1]) >= limit || along < self.ends[0] || along > self.ends[1] {
             return None;
         }
         let mut nearest = f64::INFINITY;

@@ -1,9 +1,12 @@
 //! Whether the loops of the stitch hold each other: Gauss linking numbers of loop heads with the legs of the next loop of
 //! their wale.
 
-use super::vector::{Vector, add, cross, dot, norm, sub};
-use super::{Mesh, Part};
+use super::vector::{Vector, add, cross, dot, norm, scale, sub};
+use super::{Mesh, Part, Ply};
 use std::f64::consts::PI;
+
+/// Far from every loop, mm.
+const FAR: f64 = 1e3;
 
 /// How the head of one loop links with the next loop of its wale.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,39 +29,43 @@ impl Link {
     }
 }
 
-/// A loop of a periodic cell: its nodes, from the top of the entry leg to the top of the exit leg.
+/// A whole loop: its nodes, from the top of the entry leg to the top of the exit leg.
 struct Loop {
     thread: usize,
     nodes: Vec<Vector>,
-    /// Node furthest along y.
+    /// Node furthest along the wale.
     apex: usize,
     /// Middle between the tops of its legs.
     base: Vector,
 }
 
-/// One entry per loop of a periodic cell.
+/// One entry per loop of a stitched fabric; where threads are cut, per whole loop whose next one is whole too.
 pub fn links(mesh: &Mesh) -> Vec<Link> {
-    let Some([lx, ly]) = mesh.period else { return Vec::new() };
-    let loops = loops(mesh);
+    // wales run along the warps
+    let Some(wale) = mesh.blocks.iter().find(|b| b.ply == Ply::Warp).map(|b| b.fibre) else { return Vec::new() };
+    let loops = loops(mesh, wale);
     let name = |l: &Loop| mesh.threads[l.thread].name.clone();
     let mut links = Vec::new();
     for head in &loops {
         // The next loop of the wale is the one whose legs start nearest to the apex, in the image where they do.
         let apex = head.nodes[head.apex];
         let image = |l: &Loop| {
-            let cells = [(apex[0] - l.base[0]) / lx, (apex[1] - l.base[1]) / ly];
-            [cells[0].round() * lx, cells[1].round() * ly, 0.0]
+            let whole = |k: usize, period: f64| ((apex[k] - l.base[k]) / period).round() * period;
+            mesh.period.map_or([0.0; 3], |[lx, ly]| [whole(0, lx), whole(1, ly), 0.0])
         };
         let away = |l: &Loop| {
             let d = sub(apex, add(l.base, image(l)));
             libm::hypot(d[0], d[1])
         };
         let Some(next) = loops.iter().min_by(|a, b| away(a).total_cmp(&away(b))) else { continue };
-        let level = 0.5 * (head.base[1] + apex[1]);
-        let closed: Vec<Vector> = head.nodes.iter().copied().filter(|p| p[1] > level).collect();
+        let height = dot(sub(apex, head.base), wale);
+        if mesh.period.is_none() && away(next) > 0.5 * height {
+            continue;
+        }
+        let above = |p: &Vector| dot(sub(*p, head.base), wale) > 0.5 * height;
+        let closed: Vec<Vector> = head.nodes.iter().copied().filter(above).collect();
         let legs: Vec<Vector> = next.nodes.iter().map(|&p| add(p, image(next))).collect();
-        let far = 10.0 * (lx + ly);
-        let leg = |nodes: &[Vector]| linking(&closed, &detour(nodes, far));
+        let leg = |nodes: &[Vector]| linking(&closed, &detour(nodes, scale(wale, FAR)));
         let exit: Vec<Vector> = legs[next.apex..].iter().rev().copied().collect();
         // The exit leg is walked backwards so that both start at the warp; along the thread it counts the other way.
         let numbers = [leg(&legs[..=next.apex]), -leg(&exit)];
@@ -67,11 +74,12 @@ pub fn links(mesh: &Mesh) -> Vec<Link> {
     links
 }
 
-fn loops(mesh: &Mesh) -> Vec<Loop> {
+fn loops(mesh: &Mesh, wale: Vector) -> Vec<Loop> {
     let mut loops = Vec::new();
     for (index, thread) in mesh.threads.iter().enumerate() {
         let beams = thread.beams();
-        let starts = (0..beams)
+        let closed = thread.wrap.is_some();
+        let starts = (usize::from(!closed)..beams)
             .filter(|&i| thread.parts[i] == Part::Loop && thread.parts[(i + beams - 1) % beams] == Part::Underlap);
         for start in starts {
             let mut nodes = Vec::new();
@@ -80,8 +88,12 @@ fn loops(mesh: &Mesh) -> Vec<Loop> {
                 nodes.push(mesh.position(thread.beam(beam)[0]));
                 beam += 1;
             }
+            if beam == beams && !closed {
+                continue;
+            }
             nodes.push(mesh.position(thread.beam(beam - 1)[1]));
-            let apex = (0..nodes.len()).fold(0, |best, i| if nodes[i][1] > nodes[best][1] { i } else { best });
+            let height = |i: usize| dot(nodes[i], wale);
+            let apex = (0..nodes.len()).fold(0, |best, i| if height(i) > height(best) { i } else { best });
             let [a, b] = [nodes[0], nodes[nodes.len() - 1]];
             let base = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])];
             loops.push(Loop { thread: index, nodes, apex, base });
@@ -90,15 +102,15 @@ fn loops(mesh: &Mesh) -> Vec<Loop> {
     loops
 }
 
-/// Closes an open leg by a way around the fabric: down from its end, along y, up and back to its start.
-fn detour(leg: &[Vector], far: f64) -> Vec<Vector> {
+/// Closes an open leg by a way around the fabric: down from its end, far along the wale, up and back to its start.
+fn detour(leg: &[Vector], far: Vector) -> Vec<Vector> {
     let [start, end] = [leg[0], leg[leg.len() - 1]];
     let mut closed = leg.to_vec();
     closed.extend([
-        [end[0], end[1], -far],
-        [end[0], end[1] + far, -far],
-        [start[0], end[1] + far, far],
-        [start[0], start[1], far],
+        [end[0], end[1], -FAR],
+        [end[0] + far[0], end[1] + far[1], -FAR],
+        [start[0] + far[0], end[1] + far[1], FAR],
+        [start[0], start[1], FAR],
     ]);
     closed
 }

@@ -24,7 +24,7 @@ pub struct Report {
     pub period: Option<[f64; 2]>,
     /// Length of all threads, of their loops and of their underlaps, mm.
     pub lengths: [f64; 3],
-    /// Number of laps.
+    /// Number of loops whose next one is whole: all laps of a cell.
     pub laps: usize,
     pub areal_mass: Option<ArealMass>,
     /// Smallest scaled Jacobian and its block.
@@ -73,6 +73,8 @@ impl fmt::Display for Report {
         writeln!(f, "{}", self.title)?;
         if let Some([lx, ly]) = self.period {
             writeln!(f, "cell          {lx:.3} × {ly:.3} mm, {} warps, {} wefts", self.warps, self.wefts)?;
+        } else if self.warps + self.wefts > 0 {
+            writeln!(f, "specimen      {} warps, {} wefts, {} pieces of thread", self.warps, self.wefts, self.threads)?;
         } else {
             writeln!(f, "scene         {} blocks, {} threads, no period", self.bodies, self.threads)?;
         }
@@ -84,7 +86,7 @@ impl fmt::Display for Report {
             writeln!(f, "areal mass    warp {:.2}, weft {:.2}, stitch {:.2} g/m²", mass.warp, mass.weft, mass.stitch)?;
         }
         let [all, loops, underlaps] = self.lengths;
-        if self.laps > 0 {
+        if self.laps > 0 && self.period.is_some() {
             let laps = self.laps as f64;
             writeln!(f, "threads       {} of {all:.2} mm in all, {} laps", self.threads, self.laps)?;
             writeln!(f, "lap           loop {:.3} + underlap {:.3} mm", loops / laps, underlaps / laps)?;

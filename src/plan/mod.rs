@@ -4,20 +4,20 @@
 //! fibre lines; integration. When the contact skin is used up: grid, then candidates. For energies and limits: the
 //! diagnose stages, then the collect stages, which add up what the host reads. An effect that the scene does not have adds no buffer and no stage.
 
+mod conditions;
 mod solids;
 mod surfaces;
 mod threads;
 mod totals;
 
 use crate::case::Case;
-use crate::case::domain::Domain;
 use crate::conditions::prescribed;
 use crate::contact::{
     self, Params as ContactParams, candidates, grid, penalty, status, threads as thread_contact, travel,
 };
 use crate::dynamics::{assemble, fibre_lines, integrate, time_step};
 use crate::elements::{beam2, bend, hex8};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::kernel::buffer::{Buffer, Description, Initial, Kind};
 use crate::kernel::position::quanta;
 use crate::kernel::stage::{Access, Code, Kernel, Plan, Stage};
@@ -26,6 +26,7 @@ use crate::materials::neo_hookean::NeoHookean;
 use crate::materials::{Law, Material};
 use crate::mesh::Mesh;
 use bytemuck::Pod;
+use conditions::Conditions;
 use solids::Solids;
 use surfaces::Surfaces;
 use threads::Threads;
@@ -88,6 +89,7 @@ pub struct Buffers {
     pub pair_sums: Option<Buffer>,
     pub pair_keys: Option<Buffer>,
     pub pair_state: Option<Buffer>,
+    pub prescribed: Option<Buffer>,
     pub reaction: Option<Buffer>,
     /// Slip of each contact slave since the start, mm.
     pub slip: Option<Buffer>,
@@ -186,6 +188,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let solids = Solids::new(mesh)?;
     let threads = Threads::new(mesh, effects.bending);
     let (hexes, beams, bends) = (solids.headers.len(), threads.thread.len(), threads.pairs.len() / 2);
+    let conditions = Conditions::new(case, mesh)?;
     let first_thread = first as u32;
 
     let mut b = Builder::default();
@@ -280,6 +283,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
                 friction,
                 mesh,
                 threads: &threads,
+                conditions: &conditions,
                 capacity,
                 reference,
                 quanta: quanta_,
@@ -342,12 +346,11 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
 
     // conditions
     let gravity = effects.gravity_mm_s2.unwrap_or_default().map(|g| g as f32);
-    let conditions = conditions(case, mesh)?;
     let (mut reaction, mut reaction_work, mut condition_nodes) = (None, None, None);
-    if !conditions.0.is_empty() {
-        let count = conditions.0.len() / 2;
-        let at = b.indices("prescribed nodes", conditions.0);
-        let targets = b.table("prescribed displacements", conditions.1);
+    if conditions.count() > 0 {
+        let count = conditions.count();
+        let at = b.indices("prescribed nodes", conditions.nodes);
+        let targets = b.table("prescribed displacements", conditions.targets);
         let (force, done) = (b.scratch("reactions", 3 * count), b.scratch("work of reactions", count));
         (reaction, reaction_work, condition_nodes) = (Some(force), Some(done), Some((at, count)));
         let reads = [at, targets, velocity, mass];
@@ -466,6 +469,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             pair_sums: pairs.map(|p| p.sums),
             pair_keys: pairs.map(|p| p.keys),
             pair_state: pairs.map(|p| p.state),
+            prescribed: condition_nodes.map(|(at, _)| at),
             reaction,
             slip,
         },
@@ -543,6 +547,7 @@ struct ContactScene<'a> {
     friction: f64,
     mesh: &'a Mesh,
     threads: &'a Threads,
+    conditions: &'a Conditions,
     capacity: Capacity,
     reference: Buffer,
     quanta: Buffer,
@@ -653,7 +658,7 @@ impl ContactScene<'_> {
         let mesh = self.mesh;
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];
-        for x in &mesh.nodes {
+        for x in mesh.nodes.iter().copied().chain(self.conditions.ends(mesh)) {
             for k in 0..2 {
                 (low[k], high[k]) = (low[k].min(x[k]), high[k].max(x[k]));
             }
@@ -793,41 +798,4 @@ fn constant_stiffness(mesh: &Mesh, threads: &Threads, axial: &[f64], covered: &[
         }
     }
     k
-}
-
-/// Prescribed nodes with masks, and their displacements.
-fn conditions(case: &Case, mesh: &Mesh) -> Result<(Vec<u32>, Vec<f64>)> {
-    let Domain::Mesh(inline) = &case.domain else { return Ok(Default::default()) };
-    let mut by_node = std::collections::BTreeMap::<usize, (u32, [f64; 3])>::new();
-    for (number, condition) in inline.conditions.iter().enumerate() {
-        let blocks = mesh.blocks.iter().map(|b| (&b.name, b.first, b.count()));
-        let threads = mesh.threads.iter().map(|t| (&t.name, t.first, t.count));
-        for (name, first, count) in blocks.chain(threads) {
-            if condition.body.as_ref().is_some_and(|body| body != name) {
-                continue;
-            }
-            let [low, high] = condition.within;
-            let inside = |x: &[f64; 3]| (0..3).all(|k| x[k] >= low[k] - 1e-6 && x[k] <= high[k] + 1e-6);
-            for node in (first..first + count).filter(|n| inside(&mesh.nodes[*n])) {
-                let (mask, target) = by_node.entry(node).or_default();
-                for k in (0..3).filter(|k| condition.components[*k]) {
-                    let displacement = condition.displacement_mm[k];
-                    if *mask >> k & 1 == 1 && target[k] != displacement {
-                        return Err(Error::case(
-                            format!("domain.mesh.conditions.{number}"),
-                            format!(
-                                "prescribes {displacement} mm along {} at node {node}, which an earlier condition moves by {} mm; keep one of them",
-                                ["x", "y", "z"][k],
-                                target[k]
-                            ),
-                        ));
-                    }
-                    *mask |= 1 << k;
-                    target[k] = displacement;
-                }
-            }
-        }
-    }
-    let nodes = by_node.iter().flat_map(|(node, (mask, _))| [*node as u32, *mask]).collect();
-    Ok((nodes, by_node.values().flat_map(|(_, target)| *target).collect()))
 }

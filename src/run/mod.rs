@@ -189,9 +189,12 @@ struct Place {
 
 /// Largest displacement that a domain prescribes, mm.
 fn reach(domain: &Domain) -> f64 {
-    let Domain::Mesh(inline) = domain else { return 0.0 };
     let size = |d: &[f64; 3]| libm::sqrt(d.iter().map(|c| c * c).sum());
-    inline.conditions.iter().map(|c| size(&c.displacement_mm)).fold(0.0, f64::max)
+    match domain {
+        Domain::Cell { .. } => 0.0,
+        Domain::Specimen(specimen) => specimen.displacement_mm,
+        Domain::Mesh(inline) => inline.conditions.iter().map(|c| size(&c.displacement_mm)).fold(0.0, f64::max),
+    }
 }
 
 /// Angle after which the kinetic energy of shear is judged, degrees.

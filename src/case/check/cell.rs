@@ -1,16 +1,14 @@
-//! A periodic cell of fabric: do yarns, threads and resolution go together?
+//! A periodic cell of fabric: do its size, its load steps and its resolution go together?
 
-use super::{MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM};
-use crate::case::fabric::{Fabric, Yarn};
+use super::{MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM, fabric};
+use crate::case::Case;
+use crate::case::fabric::Fabric;
 use crate::case::origin::Origin;
 use crate::case::steps::Step;
-use crate::case::{Case, FabricSource};
 use crate::error::Result;
 
 pub fn check(case: &Case, warps: usize, wefts: usize, origin: &Origin) -> Result<()> {
-    let Some(FabricSource::Inline(fabric)) = &case.fabric else {
-        return Err(origin.error("fabric", "is missing, a cell needs one: give a fabric file or the fabric itself"));
-    };
+    let fabric = fabric::check(case, "cell", origin)?;
     if wefts % 2 == 1 {
         let message = format!("{wefts} is odd, a tricot repeats after two courses: give an even number");
         return Err(origin.error("domain.cell.wefts", message));
@@ -19,43 +17,7 @@ pub fn check(case: &Case, warps: usize, wefts: usize, origin: &Origin) -> Result
         let message = "a cell has no conditions to move: use shear, or a domain.mesh with conditions";
         return Err(origin.error(&format!("steps.{i}"), message));
     }
-    yarn("warp", &fabric.warp, origin)?;
-    yarn("weft", &fabric.weft, origin)?;
-    threads(case, fabric, origin)?;
     size(case, fabric, [warps, wefts], origin)
-}
-
-fn yarn(name: &str, yarn: &Yarn, origin: &Origin) -> Result<()> {
-    let Yarn { width_mm: width, pitch_mm: pitch, thickness_mm: thickness, .. } = *yarn;
-    if width > pitch {
-        let message = format!("yarns overlap: {width} mm wide at a pitch_mm of {pitch}, give at most the pitch");
-        return Err(origin.error(&format!("fabric.{name}.width_mm"), message));
-    }
-    if thickness > width {
-        let message =
-            format!("{thickness} mm is more than the width_mm of {width}, give a yarn that is wider than thick");
-        return Err(origin.error(&format!("fabric.{name}.thickness_mm"), message));
-    }
-    Ok(())
-}
-
-/// One thread, as thin as it starts, has to pass between two yarns of either ply.
-fn threads(case: &Case, fabric: &Fabric, origin: &Origin) -> Result<()> {
-    let Some(contact) = case.effects.contact.as_ref().filter(|contact| contact.thread_yarn) else { return Ok(()) };
-    let (radius, ratio) = (fabric.stitch.radius_mm, contact.initial_radius_ratio);
-    for (name, yarn) in [("warp", &fabric.warp), ("weft", &fabric.weft)] {
-        let gap = yarn.pitch_mm - yarn.width_mm;
-        if 2.0 * radius * ratio > gap + 1e-9 {
-            let message = format!(
-                "{radius} does not fit: a thread of {:.4} mm diameter at the start (2 × {radius} × \
-                 effects.contact.initial_radius_ratio {ratio}) in the {name} gap of {gap:.4} mm; \
-                 lower the radius, the ratio or fabric.{name}.width_mm",
-                2.0 * radius * ratio
-            );
-            return Err(origin.error("fabric.stitch.radius_mm", message));
-        }
-    }
-    Ok(())
 }
 
 fn size(case: &Case, fabric: &Fabric, [warps, wefts]: [usize; 2], origin: &Origin) -> Result<()> {
@@ -68,7 +30,7 @@ fn size(case: &Case, fabric: &Fabric, [warps, wefts]: [usize; 2], origin: &Origi
             return Err(origin.error(&format!("domain.cell.{name}"), message));
         }
     }
-    let resolution = &case.resolution;
+    let resolution = &case.resolution.refined();
     let slices = lengths.map(|length| (length / resolution.slice_mm).round().max(1.0));
     let sections =
         [warps * resolution.warp_columns, wefts * resolution.weft_columns].map(|n| (n * resolution.layers) as f64);

@@ -1,0 +1,51 @@
+//! A fabric that is to be built: do its yarns and threads go together?
+
+use crate::case::fabric::{Fabric, Yarn};
+use crate::case::origin::Origin;
+use crate::case::{Case, FabricSource};
+use crate::error::Result;
+
+/// The fabric of a case whose domain is a `what`.
+pub fn check<'a>(case: &'a Case, what: &str, origin: &Origin) -> Result<&'a Fabric> {
+    let Some(FabricSource::Inline(fabric)) = &case.fabric else {
+        let message = format!("is missing, a {what} needs one: give a fabric file or the fabric itself");
+        return Err(origin.error("fabric", message));
+    };
+    yarn("warp", &fabric.warp, origin)?;
+    yarn("weft", &fabric.weft, origin)?;
+    threads(case, fabric, origin)?;
+    Ok(fabric)
+}
+
+fn yarn(name: &str, yarn: &Yarn, origin: &Origin) -> Result<()> {
+    let Yarn { width_mm: width, pitch_mm: pitch, thickness_mm: thickness, .. } = *yarn;
+    if width > pitch {
+        let message = format!("yarns overlap: {width} mm wide at a pitch_mm of {pitch}, give at most the pitch");
+        return Err(origin.error(&format!("fabric.{name}.width_mm"), message));
+    }
+    if thickness > width {
+        let message =
+            format!("{thickness} mm is more than the width_mm of {width}, give a yarn that is wider than thick");
+        return Err(origin.error(&format!("fabric.{name}.thickness_mm"), message));
+    }
+    Ok(())
+}
+
+/// One thread, as thin as it starts, has to pass between two yarns of either ply.
+fn threads(case: &Case, fabric: &Fabric, origin: &Origin) -> Result<()> {
+    let Some(contact) = case.effects.contact.as_ref().filter(|contact| contact.thread_yarn) else { return Ok(()) };
+    let (radius, ratio) = (fabric.stitch.radius_mm, contact.initial_radius_ratio);
+    for (name, yarn) in [("warp", &fabric.warp), ("weft", &fabric.weft)] {
+        let gap = yarn.pitch_mm - yarn.width_mm;
+        if 2.0 * radius * ratio > gap + 1e-9 {
+            let message = format!(
+                "{radius} does not fit: a thread of {:.4} mm diameter at the start (2 × {radius} × \
+                 effects.contact.initial_radius_ratio {ratio}) in the {name} gap of {gap:.4} mm; \
+                 lower the radius, the ratio or fabric.{name}.width_mm",
+                2.0 * radius * ratio
+            );
+            return Err(origin.error("fabric.stitch.radius_mm", message));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,91 @@
+//! Which nodes are prescribed, and by how much they move.
+
+use crate::case::Case;
+use crate::case::domain::{Domain, InlineMesh, Specimen};
+use crate::error::{Error, Result};
+use crate::fabric::specimen;
+use crate::mesh::Mesh;
+use std::collections::BTreeMap;
+
+/// Tables of prescribed motion.
+#[derive(Default)]
+pub struct Conditions {
+    /// Node and mask of components of each condition, see [`crate::conditions::prescribed::NODES`].
+    pub nodes: Vec<u32>,
+    /// Displacement at full amplitude, mm, three numbers a condition.
+    pub targets: Vec<f64>,
+}
+
+impl Conditions {
+    /// Conditions of a case.
+    ///
+    /// # Errors
+    /// Names a condition that contradicts an earlier one.
+    pub fn new(case: &Case, mesh: &Mesh) -> Result<Self> {
+        let by_node = match &case.domain {
+            Domain::Cell { .. } => BTreeMap::new(),
+            Domain::Specimen(specimen) => clamps(specimen, mesh),
+            Domain::Mesh(inline) => boxes(inline, mesh)?,
+        };
+        Ok(Self {
+            nodes: by_node.iter().flat_map(|(node, (mask, _))| [*node as u32, *mask]).collect(),
+            targets: by_node.values().flat_map(|(_, target)| *target).collect(),
+        })
+    }
+
+    /// Number of conditions.
+    pub fn count(&self) -> usize {
+        self.nodes.len() / 2
+    }
+
+    /// Where each prescribed node ends, mm.
+    pub fn ends<'a>(&'a self, mesh: &'a Mesh) -> impl Iterator<Item = [f64; 3]> + 'a {
+        let moved = |(n, by): (&[u32], &[f64])| [0, 1, 2].map(|k| mesh.nodes[n[0] as usize][k] + by[k]);
+        self.nodes.chunks_exact(2).zip(self.targets.chunks_exact(3)).map(moved)
+    }
+}
+
+/// Mask of components and displacement of each prescribed node.
+type ByNode = BTreeMap<usize, (u32, [f64; 3])>;
+
+/// Both clamps hold all components; the one at x > 0 moves.
+fn clamps(specimen: &Specimen, mesh: &Mesh) -> ByNode {
+    let [held, moved] = specimen::clamped(specimen, mesh);
+    let held = held.into_iter().map(|node| (node, (7, [0.0; 3])));
+    held.chain(moved.into_iter().map(|node| (node, (7, [specimen.displacement_mm, 0.0, 0.0])))).collect()
+}
+
+/// Conditions of an inline mesh.
+fn boxes(inline: &InlineMesh, mesh: &Mesh) -> Result<ByNode> {
+    let mut by_node = ByNode::new();
+    for (number, condition) in inline.conditions.iter().enumerate() {
+        let blocks = mesh.blocks.iter().map(|b| (&b.name, b.first, b.count()));
+        let threads = mesh.threads.iter().map(|t| (&t.name, t.first, t.count));
+        for (name, first, count) in blocks.chain(threads) {
+            if condition.body.as_ref().is_some_and(|body| body != name) {
+                continue;
+            }
+            let [low, high] = condition.within;
+            let inside = |x: &[f64; 3]| (0..3).all(|k| x[k] >= low[k] - 1e-6 && x[k] <= high[k] + 1e-6);
+            for node in (first..first + count).filter(|n| inside(&mesh.nodes[*n])) {
+                let (mask, target) = by_node.entry(node).or_default();
+                for k in (0..3).filter(|k| condition.components[*k]) {
+                    let displacement = condition.displacement_mm[k];
+                    if *mask >> k & 1 == 1 && target[k] != displacement {
+                        return Err(Error::case(
+                            format!("domain.mesh.conditions.{number}"),
+                            format!(
+                                "prescribes {displacement} mm along {} at node {node}, which an earlier condition moves by {} mm; keep one of them",
+                                ["x", "y", "z"][k],
+                                target[k]
+                            ),
+                        ));
+                    }
+                    *mask |= 1 << k;
+                    target[k] = displacement;
+                }
+            }
+        }
+    }
+    Ok(by_node)
+}
