@@ -9,10 +9,12 @@ use std::sync::Arc;
 use tricot::backend::gpu::{Device, Gpu};
 use tricot::case::read::{Loaded, read};
 use tricot::error::Error;
+use tricot::fabric;
 use tricot::kernel::buffer::{Description, Initial, Kind};
 use tricot::measure::yarns;
 use tricot::mesh::Ply;
-use tricot::run::simulation;
+use tricot::plan::Capacity;
+use tricot::run::{Machine, Options, run_on, simulation};
 use tricot::simulate::{Make, Simulation};
 
 const CASE: &str = "cases/unit_cell_shear.json";
@@ -139,6 +141,64 @@ fn a_device_that_is_lost_stops_the_run_with_its_name() {
     assert!(error.to_string().contains("the device was lost"), "{error}");
     assert!(cell.alive().is_err());
     assert_eq!(error.exit_code(), 6);
+}
+
+/// What is on disk when a device is lost in the middle of a run is whole, and stays.
+#[test]
+fn a_device_that_is_lost_leaves_whole_results() {
+    let Some(device) = device() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("cell");
+    let options = Options {
+        output: output.clone(),
+        precision: None,
+        threads: None,
+        machine: Machine::Gpu,
+        adapter: String::new(),
+        force: false,
+        resume: false,
+        from: None,
+        quiet: true,
+    };
+    let make = Make { device: Some(Arc::clone(&device)), ..Make::default() };
+    let rows = || fs::read_to_string(output.join("history.csv")).unwrap_or_default().lines().count();
+    let error = std::thread::scope(|scope| {
+        let run = scope.spawn(|| run_on(&case(&SHORT), &options, make).unwrap_err());
+        while rows() < 20 {
+            assert!(!run.is_finished(), "the run ended too soon");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        device.lose();
+        run.join().unwrap()
+    });
+    println!("{error} after {} rows", rows() - 1);
+    assert!(matches!(error, Error::Device(_)), "{error}");
+    let history = fs::read_to_string(output.join("history.csv")).unwrap();
+    let mut lines = history.lines().map(|l| l.split(',').collect::<Vec<_>>());
+    let header = lines.next().unwrap();
+    let column = |name: &str| header.iter().position(|h| *h == name).unwrap();
+    for row in lines {
+        let number = |name| row[column(name)].parse::<f64>().unwrap();
+        assert!(row.len() == header.len() && number("min_jacobian") > 0.0 && number("e_internal_mj") > 0.0, "{row:?}");
+    }
+    let summary: Value = serde_json::from_slice(&fs::read(output.join("summary.json")).unwrap()).unwrap();
+    assert!(summary["verdict"].as_str().unwrap().contains("lost"), "{summary:#}");
+    assert!(summary["state_hash"].is_null());
+}
+
+#[test]
+fn contact_tables_that_overflow_on_a_device_grow_and_leave_no_trace() {
+    let Some(device) = device() else { return };
+    let hash = |capacity: Capacity| {
+        let loaded = case(&SHORT);
+        let mesh = fabric::build(&loaded.case, loaded.fabric.as_ref()).unwrap();
+        let friction = loaded.fabric.as_ref().unwrap().friction;
+        let make = Make { device: Some(Arc::clone(&device)), ..Make::default() };
+        let mut cell = Simulation::with_capacity(&loaded.case, friction, mesh, make, capacity).unwrap();
+        cell.advance(1.2e-4, |_| false).unwrap_or_else(|e| panic!("{e}"));
+        cell.fluctuations()
+    };
+    assert!(hash(Capacity { cell: 6, slots: 1, beam_slots: 1 }) == hash(Capacity::default()));
 }
 
 #[test]

@@ -10,12 +10,17 @@ const LONGEST_FILE: usize = 900;
 
 /// Every Rust file below a folder.
 fn sources(folder: &str) -> Vec<PathBuf> {
+    files(folder, "rs")
+}
+
+/// Every file with an extension below a folder.
+fn files(folder: &str, extension: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
-            found.extend(sources(path.to_str().unwrap()));
-        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.extend(files(path.to_str().unwrap(), extension));
+        } else if path.extension().is_some_and(|e| e == extension) {
             found.push(path);
         }
     }
@@ -81,17 +86,34 @@ fn imports_point_one_way() {
 fn files_are_short_documented_and_finished() {
     let unfinished =
         [["TO", "DO"], ["FIX", "ME"], ["db", "g!("], ["to", "do!("], ["unimplemen", "ted!("]].map(|w| w.concat());
-    for folder in ["src", "tests", "benches"] {
-        for path in sources(folder) {
+    for folder in ["src", "shaders", "tests", "benches"] {
+        for path in [sources(folder), files(folder, "wgsl")].concat() {
             let text = text(&path);
             let lines = text.lines().count();
             assert!(lines <= LONGEST_FILE, "{}: {lines} lines; split it by concept", path.display());
-            let documented = text.starts_with("//! ") && text.lines().next().unwrap().len() > 20;
+            let comment = if folder == "shaders" { "// " } else { "//! " };
+            let documented = text.starts_with(comment) && text.lines().next().unwrap().len() > 20;
             assert!(documented, "{}: starts without saying what it is", path.display());
             for word in &unfinished {
                 assert!(!text.contains(word), "{}: {word}", path.display());
             }
         }
+    }
+}
+
+/// A shader has the path of its Rust file, and a file with a kernel has a shader.
+#[test]
+fn shaders_are_twins() {
+    let shaders = files("shaders", "wgsl");
+    assert!(shaders.len() > 20);
+    for shader in &shaders {
+        let twin = Path::new("src").join(shader.strip_prefix("shaders").unwrap()).with_extension("rs");
+        assert!(twin.exists(), "{} has no Rust twin", shader.display());
+    }
+    for source in sources("src") {
+        let twin = Path::new("shaders").join(source.strip_prefix("src").unwrap()).with_extension("wgsl");
+        let is_kernel = code(&source).lines().any(|l| l.starts_with("impl") && l.contains(" Kernel for "));
+        assert!(!is_kernel || twin.exists(), "{} has no {}", source.display(), twin.display());
     }
 }
 

@@ -163,3 +163,48 @@ impl Composer {
         if kept.is_empty() { Ok(()) } else { Err(Error::Shader(format!("shaders/{path}.wgsl: #if without #endif"))) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::exact::Exact;
+    use crate::kernel::stage::{Code, Kernel};
+
+    fn stage(shader: Shader) -> Stage {
+        let kernel = Code { shader, ..Code::of::<Exact>() };
+        let (reads, writes, params, constants) = Default::default();
+        Stage { name: "test", first: 0, count: 1, grain: 1, reads, writes, params, constants, kernel, waits: true }
+    }
+
+    #[test]
+    fn an_error_names_the_file_and_line_of_the_source() {
+        let mut text = Text::of(&stage(Exact::SHADER)).unwrap();
+        assert!(text.module().is_ok());
+        let (file, number) = ("kernel/position", 5);
+        let at = text.lines.iter().position(|l| *l == (file, number)).unwrap();
+        let mut lines: Vec<&str> = text.text.lines().collect();
+        for (wrong, why) in [("let x = ;", "expected"), ("fn wrong() -> f32 { return 1u; }", "return")] {
+            lines[at] = wrong;
+            let broken = Text { text: lines.join("\n"), lines: std::mem::take(&mut text.lines) };
+            let message = broken.module().unwrap_err().to_string();
+            println!("{message}");
+            assert!(message.starts_with("shaders/kernel/position.wgsl:5: "), "{message}");
+            assert!(message.to_lowercase().contains(why), "{message}");
+            text.lines = broken.lines;
+        }
+        let missing = Text::of(&stage(Shader::new("kernel/nothing", "nothing"))).unwrap_err().to_string();
+        assert!(missing.contains("shaders/kernel/nothing.wgsl"), "{missing}");
+    }
+
+    #[test]
+    fn an_effect_that_is_missing_leaves_no_text() {
+        let text = |defines: &'static [&'static str]| {
+            let shader = Shader { defines, ..Shader::new("dynamics/integrate", "integrate") };
+            Text::of(&stage(shader)).unwrap().text
+        };
+        let (bare, lines, falling) = (text(&[]), text(&["LINES"]), text(&["GRAVITY"]));
+        assert!(lines.contains("correction") && !bare.contains("correction"));
+        assert!(falling.contains("params.gravity") && !bare.contains("params.gravity"));
+        assert!(!bare.contains('#'), "directives are not text");
+    }
+}

@@ -123,13 +123,20 @@ pub fn simulation(loaded: &Loaded, make: Make) -> Result<Simulation> {
 /// Runs a case.
 ///
 /// # Errors
-/// Bad input, a folder that cannot be used, or a guard that stopped the run; what was computed by then stays on disk.
+/// Bad input, a folder that cannot be used, a guard that stopped the run, or a device that failed; what was computed by then
+/// stays on disk.
 pub fn run(loaded: &Loaded, options: &Options) -> Result<Outcome> {
+    run_on(loaded, options, make(options.precision.unwrap_or(loaded.case.integration.precision), options)?)
+}
+
+/// Runs a case on a machine that is ready, whatever the options say of it.
+///
+/// # Errors
+/// As of [`run`].
+pub fn run_on(loaded: &Loaded, options: &Options, make: Make) -> Result<Outcome> {
     let mut loaded = loaded.clone();
-    if let Some(precision) = options.precision {
-        loaded.case.integration.precision = precision;
-    }
-    let mut simulation = simulation(&loaded, make(loaded.case.integration.precision, options)?)?;
+    loaded.case.integration.precision = make.precision;
+    let mut simulation = simulation(&loaded, make)?;
     let start = Start::of(&loaded.case, options, &mut simulation)?;
     if !matches!(start, Start::Resumed(..)) {
         directory::prepare(&options.output, options.force)?;

@@ -160,7 +160,8 @@ impl Device {
         let faults = Arc::new(Mutex::new(Faults::default()));
         let (lost, failed) = (Arc::clone(&faults), Arc::clone(&faults));
         device.set_device_lost_callback(move |_, why| {
-            locked(&lost).lost.get_or_insert(format!("the device was lost: {}", line(&why)));
+            let why = if why.is_empty() { "without a word from its driver" } else { &why };
+            locked(&lost).lost.get_or_insert(format!("the device was lost, {}", line(why)));
         });
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             locked(&failed).first.get_or_insert(line(&error.to_string()));
