@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Instant;
 use tricot::backend::gpu::Device;
 use tricot::case::read::read;
-use tricot::kernel::shader::Text;
+use tricot::kernel::shader::{ENTRY, Text};
 use tricot::kernel::stage::Stage;
 use tricot::run::simulation;
 use tricot::simulate::{Make, Simulation};
@@ -73,7 +73,7 @@ fn floor(sheet: &Simulation, stage: &Stage, bytes_per_s: f64, operations_per_s: 
     let buffers: HashSet<usize> = stage.reads.iter().chain(stage.writes.iter().map(|(b, _)| b)).map(|b| b.0).collect();
     let written: usize = stage.writes.iter().map(|(b, _)| sheet.model.plan.buffers[b.0].len).sum();
     let bytes = 4 * (buffers.iter().map(|b| sheet.model.plan.buffers[*b].len).sum::<usize>() + written);
-    let invocations = stage.count * stage.kernel.shader.invocations;
+    let invocations = stage.count * stage.kernel.shader.share.invocations();
     let operations = operations(stage) * invocations as f64;
     (bytes as f64 / bytes_per_s).max(operations / operations_per_s)
 }
@@ -82,8 +82,7 @@ fn floor(sheet: &Simulation, stage: &Stage, bytes_per_s: f64, operations_per_s: 
 fn operations(stage: &Stage) -> f64 {
     let text = Text::of(stage).unwrap_or_else(|e| panic!("{e}"));
     let (module, info) = text.module().unwrap_or_else(|e| panic!("{e}"));
-    let entry =
-        module.entry_points.iter().position(|e| e.name == stage.kernel.shader.entry).expect("checked by a test");
+    let entry = module.entry_points.iter().position(|e| e.name == ENTRY).expect("checked by a test");
     count(&module, &module.entry_points[entry].function, info.get_entry_point(entry), &info).unwrap_or(0.0)
 }
 

@@ -11,7 +11,7 @@ use std::mem::offset_of;
 use std::panic::catch_unwind;
 use tricot::kernel::buffer::{Description, Kind};
 use tricot::kernel::row::Row;
-use tricot::kernel::shader::Text;
+use tricot::kernel::shader::{ENTRY, Text};
 use tricot::kernel::stage::{Access, Stage};
 use tricot::run::simulation;
 use tricot::simulate::Make;
@@ -137,8 +137,8 @@ fn check(name: &str, stage: &Stage, buffers: &[Description]) {
     let shader = stage.kernel.shader;
     let text = Text::of(stage).unwrap_or_else(|e| panic!("{name}: {e}"));
     let (module, info) = text.module().unwrap_or_else(|e| panic!("{name}: {e}"));
-    let entry = module.entry_points.iter().position(|e| e.name == shader.entry);
-    let entry = entry.unwrap_or_else(|| panic!("{name}: no entry point {}", shader.entry));
+    let entry = module.entry_points.iter().position(|e| e.name == ENTRY);
+    let entry = entry.unwrap_or_else(|| panic!("{name}: no entry point"));
     let uses = info.get_entry_point(entry);
     let kinds = stage.reads.iter().map(|b| (b, None)).chain(stage.writes.iter().map(|(b, access)| (b, Some(access))));
     let expected: BTreeMap<u32, _> = (0..).zip(kinds).collect();
@@ -192,7 +192,7 @@ fn check(name: &str, stage: &Stage, buffers: &[Description]) {
 fn every_twin_compiles_and_sees_what_its_stage_binds() {
     let (mut seen, mut failed) = (BTreeSet::new(), 0);
     for (name, stage, buffers) in stages() {
-        seen.insert((stage.kernel.shader.file, stage.kernel.shader.entry));
+        seen.insert((stage.kernel.shader.file, stage.kernel.shader.kernel));
         failed += usize::from(catch_unwind(|| check(&name, &stage, &buffers)).is_err());
     }
     println!("{seen:#?}");

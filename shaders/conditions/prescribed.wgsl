@@ -1,6 +1,5 @@
 // Prescribed motion: the velocity of chosen components follows the amplitude of the schedule exactly.
 
-#include "kernel/stage"
 #include "kernel/row"
 #include "dynamics/integrate"
 
@@ -27,17 +26,7 @@ struct Params {
 @group(1) @binding(7) var<storage, read_write> reactions: array<f32>;
 
 // Replaces accelerations of prescribed components, before fibre lines see them.
-@compute @workgroup_size(WORKGROUP)
-fn prescribed(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = invocation(workgroup, workgroups, local);
-    if number >= items.count {
-        return;
-    }
-    let item = items.first + number;
+fn prescribed(item: u32) {
     let node = nodes[2u * item];
     let mask = nodes[2u * item + 1u];
     let plane = arrayLength(&mass);
@@ -74,17 +63,7 @@ fn prescribed(
 @group(1) @binding(1) var<storage, read_write> correction: array<f32>;
 
 // Takes back what fibre lines did to prescribed components.
-@compute @workgroup_size(WORKGROUP)
-fn hold(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = invocation(workgroup, workgroups, local);
-    if number >= items.count {
-        return;
-    }
-    let item = items.first + number;
+fn hold(item: u32) {
     let plane = arrayLength(&correction) / 3u;
     for (var k = 0u; k < 3u; k++) {
         if ((nodes[2u * item + 1u] >> k) & 1u) == 1u {

@@ -99,16 +99,7 @@ fn best_of(slave: u32, body: u32, image: vec2<i32>, slice: i32, first: i32, is_t
     return best;
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn candidates(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let item = invocation(workgroup, workgroups, local);
-    if item >= items.count {
-        return;
-    }
+fn candidates(item: u32) {
     let back = inverse();
     let stretched = stretch(back);
     let slave = slaves[SLAVE * item];

@@ -1,20 +1,10 @@
 // The grid of the contact search: slabs of yarns and beams, each in every cell that its box touches.
 
-#include "kernel/stage"
 #if clear
 #if ROOT
 @group(1) @binding(0) var<storage, read_write> counts: array<u32>;
 
-@compute @workgroup_size(WORKGROUP)
-fn clear(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let cell = invocation(workgroup, workgroups, local);
-    if cell >= items.count {
-        return;
-    }
+fn clear(cell: u32) {
     counts[cell] = 0u;
 }
 #endif
@@ -114,16 +104,7 @@ fn grow(bounds: Bounds, back: Inverse, v: vec3<f32>) -> Bounds {
     return Bounds(min(bounds.low, x), max(bounds.high, x));
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn fill(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let item = invocation(workgroup, workgroups, local);
-    if item >= items.count {
-        return;
-    }
+fn fill(item: u32) {
     let back = inverse();
     var origin: u32;
     var reach: f32;

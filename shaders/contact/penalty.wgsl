@@ -19,7 +19,6 @@ const SUM_VIRIAL: u32 = 4u;
 const SUM_ENERGY: u32 = 13u;
 
 #if penalty
-#include "kernel/stage"
 #define PRESS
 #define STATUS
 #define PAIRS
@@ -152,16 +151,7 @@ fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
     }
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn penalty(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let item = invocation(workgroup, workgroups, local);
-    if item >= items.count {
-        return;
-    }
+fn penalty(item: u32) {
     let first_key = SLOT_KEYS * params.slots * item;
     if keys[first_key] == EMPTY {
         return;

@@ -1,6 +1,5 @@
 // Contact of beams with beams: closest points of two segments, penalty and friction as for faces.
 
-#include "kernel/stage"
 #define STATUS
 #if force
 #define PRESS
@@ -86,16 +85,7 @@ fn neighbours(a: u32, b: u32) -> bool {
     return around - 0.5 * (arcs[ARC * a + 1u] + arcs[ARC * b + 1u]) < params.self_arc;
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn pairs(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let beam = invocation(workgroup, workgroups, local);
-    if beam >= items.count {
-        return;
-    }
+fn pairs(beam: u32) {
     let back = inverse();
     let period = vec2<f32>(params.period) * QUANTUM;
     let reach = 2.0 * params.thread_radius + params.skin;
@@ -210,16 +200,7 @@ fn ends_of(beam: u32, s: f32) -> Weighted {
     return Weighted(2u, vec4<u32>(ends[2u * beam], ends[2u * beam + 1u], 0u, 0u), vec4<f32>(1.0 - s, s, 0.0, 0.0));
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn force(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let beam = invocation(workgroup, workgroups, local);
-    if beam >= items.count {
-        return;
-    }
+fn force(beam: u32) {
     let slots = params.beam_slots;
     if keys[slots * beam] == EMPTY {
         return;

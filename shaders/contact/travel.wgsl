@@ -1,6 +1,5 @@
 // How far nodes have moved since the last search, how fast they are, and whether they are still numbers.
 
-#include "kernel/stage"
 #include "kernel/position"
 #if travel
 #define STATUS
@@ -15,16 +14,7 @@
 @group(1) @binding(2) var<storage, read_write> search_quanta: array<i32>;
 @group(1) @binding(3) var<storage, read_write> search_remainder: array<f32>;
 
-@compute @workgroup_size(WORKGROUP)
-fn remember(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let node = invocation(workgroup, workgroups, local);
-    if node >= items.count {
-        return;
-    }
+fn remember(node: u32) {
     let plane = arrayLength(&remainder) / 3u;
     for (var k = 0u; k < 3u; k++) {
         search_quanta[node + k * plane] = quanta[node + k * plane];
@@ -39,16 +29,7 @@ fn remember(
 @group(1) @binding(4) var<storage, read> velocity: array<f32>;
 @group(1) @binding(5) var<storage, read_write> status: array<atomic<u32>>;
 
-@compute @workgroup_size(WORKGROUP)
-fn travel(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let node = invocation(workgroup, workgroups, local);
-    if node >= items.count {
-        return;
-    }
+fn travel(node: u32) {
     let plane = arrayLength(&remainder) / 3u;
     var square = 0.0;
     for (var k = 0u; k < 3u; k++) {

@@ -1,6 +1,5 @@
 // Accelerations: each node gathers its corner slots in a fixed order, adds contact, and divides by its mass.
 
-#include "kernel/stage"
 #include "kernel/row"
 #include "elements/hex8"
 
@@ -76,17 +75,7 @@ fn bend_at(slot: u32, k: u32) -> vec3<f32> {
     return vec3<f32>(bend_force[at], bend_force[at + 1u], bend_force[at + 2u]);
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn assemble(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = invocation(workgroup, workgroups, local);
-    if number >= items.count {
-        return;
-    }
-    let node = items.first + number;
+fn assemble(node: u32) {
     let plane = arrayLength(&mass);
     var force = vec3<f32>();
     if node < params.first_thread {

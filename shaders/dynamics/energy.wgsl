@@ -1,6 +1,5 @@
 // Kinetic energy, and that of stretched threads, as totals.
 
-#include "kernel/stage"
 #include "dynamics/totals"
 
 #if ROOT
@@ -30,16 +29,7 @@ struct Params {
 @group(1) @binding(2) var<storage, read_write> totals: array<f32>;
 #endif
 
-@compute @workgroup_size(WORKGROUP)
-fn kinetic(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let item = workgroup.y * workgroups.x + workgroup.x;
-    if item >= items.count {
-        return;
-    }
+fn kinetic(item: u32, local: u32) {
     let first = item * params.length;
     let end = min(first + params.length, params.count);
     let plane = arrayLength(&mass);
@@ -73,16 +63,7 @@ fn kinetic(
 // Numbers of a beam in the table.
 const TABLE: u32 = 6u;
 
-@compute @workgroup_size(WORKGROUP)
-fn axial(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let item = workgroup.y * workgroups.x + workgroup.x;
-    if item >= items.count {
-        return;
-    }
+fn axial(item: u32, local: u32) {
     let first = item * params.length;
     let end = min(first + params.length, params.count);
     var found = 0.0;

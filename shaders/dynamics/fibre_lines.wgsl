@@ -1,7 +1,6 @@
 // Fibre-line selective mass scaling: one workgroup works on one line, and solves its system by parallel cyclic reduction.
 
 #include "kernel/row"
-#include "kernel/stage"
 #define REFERENCE
 #include "kernel/node"
 #include "kernel/vector"
@@ -56,17 +55,8 @@ fn solution(i: u32, end: f32) -> f32 {
     return (rows[i].z - rows[i].w * end) / rows[i].x;
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn fibre_lines(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = workgroup.y * workgroups.x + workgroup.x;
-    if number >= items.count * LANES {
-        return;
-    }
-    let group = GROUP * (items.first + number / LANES);
+fn fibre_lines(number: u32, local: u32) {
+    let group = GROUP * (number / LANES);
     let lane = number % LANES;
     if lane >= groups[group + 1u] {
         return;

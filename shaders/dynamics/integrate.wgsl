@@ -1,6 +1,5 @@
 // Central differences with mass-proportional damping.
 
-#include "kernel/stage"
 #include "kernel/row"
 #include "kernel/position"
 
@@ -34,17 +33,7 @@ const WRITES: u32 = 3u;
 @group(1) @binding(WRITES + 2u) var<storage, read_write> remainder: array<f32>;
 @group(1) @binding(WRITES + 3u) var<storage, read_write> work: array<f32>;
 
-@compute @workgroup_size(WORKGROUP)
-fn integrate(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = invocation(workgroup, workgroups, local);
-    if number >= items.count {
-        return;
-    }
-    let node = items.first + number;
+fn integrate(node: u32) {
     let plane = arrayLength(&mass);
     let damping = select(row.damping_thread, row.damping_solid, node < params.first_thread);
     let keep_gain = factors(damping, row.dt_mid);

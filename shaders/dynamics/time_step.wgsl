@@ -1,6 +1,5 @@
 // The limit of the time step, node by node.
 
-#include "kernel/stage"
 #include "dynamics/assemble"
 
 #if ROOT
@@ -17,17 +16,7 @@ struct Params {
 @group(1) @binding(4) var<storage, read_write> limit: array<f32>;
 
 // Assembles the row sums of element stiffness.
-@compute @workgroup_size(WORKGROUP)
-fn element_limit(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = invocation(workgroup, workgroups, local);
-    if number >= items.count {
-        return;
-    }
-    let node = items.first + number;
+fn element_limit(node: u32) {
     var k = constant[node];
     if node < params.first_thread {
         for (var i = 0u; i < SOLID; i++) {

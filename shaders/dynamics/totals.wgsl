@@ -1,6 +1,5 @@
 // Totals: columns of numbers added up, and the worst of them, part by part. A workgroup works on a part.
 
-#include "kernel/stage"
 
 var<workgroup> sums: array<f32, WORKGROUP>;
 
@@ -42,16 +41,7 @@ fn place_of(number: u32, column: u32) -> u32 {
 #endif
 @group(1) @binding(1) var<storage, read_write> totals: array<f32>;
 
-@compute @workgroup_size(WORKGROUP)
-fn sum(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let item = workgroup.y * workgroups.x + workgroup.x;
-    if item >= items.count {
-        return;
-    }
+fn sum(item: u32, local: u32) {
     let column = item % params.columns;
     let first = item / params.columns * params.length;
     let end = min(first + params.length, params.count);
@@ -86,16 +76,7 @@ const LOWEST: f32 = -1e30;
 
 var<workgroup> places: array<u32, WORKGROUP>;
 
-@compute @workgroup_size(WORKGROUP)
-fn worst(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let item = workgroup.y * workgroups.x + workgroup.x;
-    if item >= items.count {
-        return;
-    }
+fn worst(item: u32, local: u32) {
     let first = item * params.length;
     let end = min(first + params.length, params.count);
     var known = LOWEST;

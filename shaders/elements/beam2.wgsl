@@ -1,6 +1,5 @@
 // Axial part of a 2-node beam. What includes this binds `ends`, `beams`, `quanta` and `remainder`.
 
-#include "kernel/stage"
 #include "kernel/row"
 #include "kernel/node"
 #include "kernel/vector"
@@ -48,17 +47,7 @@ fn add_row(at: u32, row: vec3<f32>) {
 @group(1) @binding(7) var<storage, read_write> virial: array<f32>;
 #endif
 
-@compute @workgroup_size(WORKGROUP)
-fn force(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = invocation(workgroup, workgroups, local);
-    if number >= items.count {
-        return;
-    }
-    let beam = items.first + number;
+fn force(beam: u32) {
     let b = vector(beam);
     let rest = beams[TABLE * beam + 3u];
     let axial = beams[TABLE * beam + 4u];

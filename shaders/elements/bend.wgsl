@@ -20,17 +20,7 @@ const SMOOTHING: f32 = 0.005;
 @group(1) @binding(8) var<storage, read_write> virial: array<f32>;
 #endif
 
-@compute @workgroup_size(WORKGROUP)
-fn force(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = invocation(workgroup, workgroups, local);
-    if number >= items.count {
-        return;
-    }
-    let bend = items.first + number;
+fn force(bend: u32) {
     let stiffness = bends[BEND * bend];
     let rest = bends[BEND * bend + 1u];
     let first = vector(pairs[2u * bend]);

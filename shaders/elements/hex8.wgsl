@@ -4,7 +4,6 @@
 const LANES: u32 = 16u;
 
 #if ROOT
-#include "kernel/stage"
 #include "kernel/row"
 #include "kernel/position"
 #include LAW
@@ -228,17 +227,8 @@ fn add_virial(at: u32, a: vec3<f32>) {
 }
 #endif
 
-@compute @workgroup_size(WORKGROUP)
-fn force(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = invocation(workgroup, workgroups, local);
-    if number >= items.count * LANES {
-        return;
-    }
-    let block = items.first + number / LANES;
+fn force(number: u32) {
+    let block = number / LANES;
     let lane = number % LANES;
     let h = hex(block, lane);
     let q = frame(h);
@@ -279,17 +269,8 @@ fn force(
 #endif
 
 #if energy
-@compute @workgroup_size(WORKGROUP)
-fn energy(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = invocation(workgroup, workgroups, local);
-    if number >= items.count * LANES {
-        return;
-    }
-    let block = items.first + number / LANES;
+fn energy(number: u32) {
+    let block = number / LANES;
     let lane = number % LANES;
     let h = hex(block, lane);
     let q = frame(h);
@@ -326,17 +307,8 @@ fn slope_across(h: Hex, point: u32, corner: u32) -> f32 {
     return sqrt(across.y * across.y + across.z * across.z);
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn bound(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let number = invocation(workgroup, workgroups, local);
-    if number >= items.count * LANES {
-        return;
-    }
-    let block = items.first + number / LANES;
+fn bound(number: u32) {
+    let block = number / LANES;
     let lane = number % LANES;
     let h = hex(block, lane);
     let q = frame(h);

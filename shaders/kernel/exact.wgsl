@@ -1,6 +1,5 @@
 // The arithmetic that a device must get right to the last bit.
 
-#include "kernel/stage"
 #include "kernel/position"
 
 #if ROOT
@@ -11,16 +10,7 @@ const STEPS: u32 = 2048u;
 @group(1) @binding(2) var<storage, read_write> remainders: array<f32>;
 @group(1) @binding(3) var<storage, read_write> sum: array<atomic<i32>>;
 
-@compute @workgroup_size(WORKGROUP)
-fn exact(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let item = invocation(workgroup, workgroups, local);
-    if item >= items.count {
-        return;
-    }
+fn exact(item: u32) {
     var q = quanta[item];
     var r = remainders[item];
     for (var step = 0u; step < STEPS; step++) {

@@ -1,4 +1,4 @@
-// What every stage has: the range of its items, and the number of an invocation among all of the stage.
+// The entry point of every stage: hands the items of the stage to its kernel. Workgroups fill a plane once a row of them is full.
 
 struct Items {
     first: u32,
@@ -7,7 +7,21 @@ struct Items {
 
 @group(2) @binding(0) var<uniform> items: Items;
 
-// Number of an invocation: workgroups fill a plane once a row of them is full.
-fn invocation(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
-    return (workgroup.y * workgroups.x + workgroup.x) * WORKGROUP + local;
+@compute @workgroup_size(WORKGROUP)
+fn main(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let group = workgroup.y * workgroups.x + workgroup.x;
+#if WORKGROUPS
+    if group < items.count * SHARES {
+        KERNEL(items.first * SHARES + group, local);
+    }
+#else
+    let number = group * WORKGROUP + local;
+    if number < items.count * SHARES {
+        KERNEL(items.first * SHARES + number);
+    }
+#endif
 }

@@ -5,7 +5,7 @@ use crate::elements::beam2::TABLE;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
 use crate::kernel::position::QUANTUM;
-use crate::kernel::shader::{Shader, WORKGROUP};
+use crate::kernel::shader::{Shader, Share};
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{add, apply, dot};
 use bytemuck::{Pod, Zeroable};
@@ -35,7 +35,7 @@ pub struct Kinetic<const TOTAL: bool>;
 impl<const TOTAL: bool> Kernel for Kinetic<TOTAL> {
     const SHADER: Shader = Shader {
         defines: if TOTAL { &["TOTAL"] } else { &[] },
-        invocations: WORKGROUP,
+        share: Share::Workgroups(1),
         ..Shader::new("dynamics/energy", "kinetic")
     };
 
@@ -70,7 +70,7 @@ pub const BEAMS: usize = 1;
 pub struct Axial;
 
 impl Kernel for Axial {
-    const SHADER: Shader = Shader { invocations: WORKGROUP, ..Shader::new("dynamics/energy", "axial") };
+    const SHADER: Shader = Shader { share: Share::Workgroups(1), ..Shader::new("dynamics/energy", "axial") };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

@@ -14,7 +14,7 @@
 use crate::elements::hex8::LANES;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::QUANTUM;
-use crate::kernel::shader::{Shader, WORKGROUP};
+use crate::kernel::shader::{Shader, Share};
 use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
 use std::cell::RefCell;
@@ -79,7 +79,7 @@ const ROWS: usize = 11;
 impl Kernel for FibreLines {
     const SHADER: Shader = Shader {
         // a workgroup for each line
-        invocations: LANES * WORKGROUP,
+        share: Share::Workgroups(LANES),
         ..Shader::new("dynamics/fibre_lines", "fibre_lines")
     };
 

@@ -7,7 +7,7 @@
 
 use crate::elements::hex8::LANES;
 use crate::kernel::lane::{Lane, Real};
-use crate::kernel::shader::{Shader, WORKGROUP};
+use crate::kernel::shader::{Shader, Share, WORKGROUP};
 use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
@@ -103,7 +103,7 @@ pub struct Sum<const TAKEN: bool>;
 impl<const TAKEN: bool> Kernel for Sum<TAKEN> {
     const SHADER: Shader = Shader {
         defines: if TAKEN { &["TAKEN"] } else { &[] },
-        invocations: WORKGROUP,
+        share: Share::Workgroups(1),
         ..Shader::new("dynamics/totals", "sum")
     };
 
@@ -142,7 +142,7 @@ pub struct Worst<const JACOBIAN: bool>;
 impl<const JACOBIAN: bool> Kernel for Worst<JACOBIAN> {
     const SHADER: Shader = Shader {
         defines: if JACOBIAN { &["JACOBIAN"] } else { &[] },
-        invocations: WORKGROUP,
+        share: Share::Workgroups(1),
         ..Shader::new("dynamics/totals", "worst")
     };
 

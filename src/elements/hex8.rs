@@ -10,7 +10,7 @@
 
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::difference;
-use crate::kernel::shader::Shader;
+use crate::kernel::shader::{Shader, Share};
 use crate::kernel::stage::{Io, Kernel};
 use crate::materials::{Material, PARAMETERS, Tensor, jacobian};
 use bytemuck::{Pod, Zeroable};
@@ -282,9 +282,9 @@ fn turn<L: Lane>(q: &Tensor<L>, a: &Tensor<L>, out: bool) -> Tensor<L> {
     full
 }
 
-/// The twin of an entry point for a law, one lane an invocation.
-const fn shader<M: Material>(entry: &'static str) -> Shader {
-    Shader { law: Some(M::SHADER), invocations: LANES, ..Shader::new("elements/hex8", entry) }
+/// The twin of a kernel for a law, one lane an invocation.
+const fn shader<M: Material>(kernel: &'static str) -> Shader {
+    Shader { law: Some(M::SHADER), share: Share::Invocations(LANES), ..Shader::new("elements/hex8", kernel) }
 }
 
 /// Something to do at each Gauss point of one register of hexahedra.

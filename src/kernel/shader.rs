@@ -1,13 +1,15 @@
 //! The WGSL twin of a kernel, and its text: files under `shaders/` put together for one stage.
 //!
-//! A twin has the path and the function names of its Rust file and repeats the same statements for one item. Its text
-//! starts with the constants of the stage; lines that begin with `#` direct the composition:
+//! A twin has the path and the function names of its Rust file and repeats the same statements for one item. A kernel is a
+//! function of the number of an item (of a share of an item, if several invocations work on it), or of a share and the
+//! number of the invocation if a workgroup does. Its text starts with the constants of the stage and ends with the entry point,
+//! `kernel/stage`, which calls it; lines that begin with `#` direct the composition:
 //!
 //! - `#include "kernel/math"` puts a file there, the first time it is asked for; `#include LAW` the file of the law
 //!   of the stage,
 //! - `#if NAME`, `#else`, `#endif` keep lines only if the name is defined, so that an effect that a scene does not have leaves
-//!   no text and no binding. Defined are the names that the kernel gives, that of its entry point, `ROOT` in the file of the
-//!   kernel itself (its bindings and entry points are not for the files that include it), and what `#define NAME` added.
+//!   no text and no binding. Defined are the names that the kernel gives, its own name, `ROOT` in the file of the
+//!   kernel itself (its bindings and kernels are not for the files that include it), and what `#define NAME` added.
 //!
 //! Every line of the text knows the file and the line it comes from. Group 0 holds the row of the step, group 1 the buffers of
 //! the stage at the numbers of the kernel's constants (reads, then writes), group 2 the range of items and the parameters of
@@ -20,6 +22,10 @@ use std::fmt::Write as _;
 
 static SHADERS: Dir = include_dir!("$CARGO_MANIFEST_DIR/shaders");
 
+/// The file with the entry point, and the name of that.
+const STAGE: &str = "kernel/stage";
+pub const ENTRY: &str = "main";
+
 /// Invocations of a workgroup.
 pub const WORKGROUP: usize = 64;
 
@@ -28,20 +34,39 @@ pub const WORKGROUP: usize = 64;
 pub struct Shader {
     /// File under `shaders/`, without its suffix.
     pub file: &'static str,
-    /// Name of the entry point.
-    pub entry: &'static str,
+    /// Name of the function.
+    pub kernel: &'static str,
     /// Names that `#if` finds defined.
     pub defines: &'static [&'static str],
     /// What `#include LAW` stands for.
     pub law: Option<&'static str>,
+    /// Who works on one item.
+    pub share: Share,
+}
+
+/// How many work on one item of a stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Share {
+    /// So many invocations.
+    Invocations(usize),
+    /// So many workgroups.
+    Workgroups(usize),
+}
+
+impl Share {
     /// Invocations that work on one item.
-    pub invocations: usize,
+    pub fn invocations(self) -> usize {
+        match self {
+            Self::Invocations(count) => count,
+            Self::Workgroups(count) => count * WORKGROUP,
+        }
+    }
 }
 
 impl Shader {
     /// One invocation an item, nothing defined.
-    pub const fn new(file: &'static str, entry: &'static str) -> Self {
-        Self { file, entry, defines: &[], law: None, invocations: 1 }
+    pub const fn new(file: &'static str, kernel: &'static str) -> Self {
+        Self { file, kernel, defines: &[], law: None, share: Share::Invocations(1) }
     }
 }
 
@@ -68,16 +93,21 @@ impl Text {
     /// A file that is not there, or a directive that makes no sense, by file and line.
     pub fn of(stage: &Stage) -> Result<Self> {
         let shader = stage.kernel.shader;
+        let (shares, of_workgroups): (_, &[_]) = match shader.share {
+            Share::Invocations(count) => (count, &[]),
+            Share::Workgroups(count) => (count, &["WORKGROUPS"]),
+        };
         let mut composer = Composer {
             shader,
             text: Self { text: String::new(), lines: Vec::new() },
             included: Vec::new(),
-            defined: [&[shader.entry], shader.defines].concat(),
+            defined: [&[shader.kernel], of_workgroups, shader.defines].concat(),
         };
-        for (name, value) in [("WORKGROUP", WORKGROUP)].iter().chain(&stage.constants) {
+        for (name, value) in [("WORKGROUP", WORKGROUP), ("SHARES", shares)].iter().chain(&stage.constants) {
             composer.push(&format!("const {name}: u32 = {value}u;"), ("constants of the stage", 0));
         }
         composer.include(shader.file)?;
+        composer.include(STAGE)?;
         Ok(composer.text)
     }
 
@@ -134,7 +164,9 @@ impl Composer {
             let wrong = |what: &str| Error::Shader(format!("shaders/{path}.wgsl:{number}: {what}"));
             let keep = kept.iter().all(|keep| *keep);
             let Some(directive) = line.trim_start().strip_prefix('#') else {
-                if keep {
+                if keep && path == STAGE {
+                    self.push(&line.replace("KERNEL", self.shader.kernel), (path, number));
+                } else if keep {
                     self.push(line, (path, number));
                 }
                 continue;

@@ -43,8 +43,8 @@ pub struct Device {
     limits: wgpu::Limits,
     /// Layout of the row of schedule data, which all stages share.
     pub(super) row_layout: wgpu::BindGroupLayout,
-    /// Compiled stages, by text and entry point.
-    pipelines: Mutex<HashMap<(String, &'static str), Arc<Pipeline>>>,
+    /// Compiled stages, by text.
+    pipelines: Mutex<HashMap<String, Arc<Pipeline>>>,
     faults: Arc<Mutex<Faults>>,
 }
 
@@ -234,13 +234,12 @@ impl Device {
     /// The compiled shader of a stage; compiled once for each text.
     pub(super) fn pipeline(&self, stage: &Stage) -> Result<Arc<Pipeline>> {
         let text = Text::of(stage)?;
-        let key = (text.text.clone(), stage.kernel.shader.entry);
         let mut known = locked(&self.pipelines);
-        if let Some(pipeline) = known.get(&key) {
+        if let Some(pipeline) = known.get(&text.text) {
             return Ok(Arc::clone(pipeline));
         }
         let pipeline = Arc::new(Pipeline::new(self, stage, &text)?);
-        known.insert(key, Arc::clone(&pipeline));
+        known.insert(text.text, Arc::clone(&pipeline));
         Ok(pipeline)
     }
 

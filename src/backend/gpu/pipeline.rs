@@ -2,7 +2,7 @@
 
 use super::device::Device;
 use crate::error::{Error, Result};
-use crate::kernel::shader::{Text, WORKGROUP};
+use crate::kernel::shader::{ENTRY, Text, WORKGROUP};
 use crate::kernel::stage::Stage;
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -74,7 +74,7 @@ impl Pipeline {
                 immediate_size: 0,
             })),
             module: &module,
-            entry_point: Some(stage.kernel.shader.entry),
+            entry_point: Some(ENTRY),
             compilation_options: wgpu::PipelineCompilationOptions {
                 zero_initialize_workgroup_memory: false,
                 ..wgpu::PipelineCompilationOptions::default()
@@ -126,7 +126,7 @@ impl Bound {
         };
         let all = stage.reads.iter().chain(stage.writes.iter().map(|(b, _)| b));
         let all: Vec<&wgpu::Buffer> = all.map(|b| &buffers[b.0]).collect();
-        let workgroups = (stage.count * stage.kernel.shader.invocations).div_ceil(WORKGROUP);
+        let workgroups = (stage.count * stage.kernel.shader.share.invocations()).div_ceil(WORKGROUP);
         let row = device.workgroups_in_a_row();
         Ok(Self {
             buffers: group(&pipeline.buffers, &all),
