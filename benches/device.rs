@@ -49,7 +49,7 @@ fn main() {
 
     let rates = device.rates();
     println!("device at best: {:.0} GB/s, {:.0} GFLOP/s", 1e-9 * rates.bytes, 1e-9 * rates.operations);
-    println!("{:16} {:>12} {:>12} {:>12}", "stage", "µs a step", "floor, µs", "of floor");
+    println!("{:20} {:>12} {:>12} {:>12}", "stage", "µs a step", "floor, µs", "of floor");
     let plan = sheet.model.plan.clone();
     let mut sum = 0.0;
     for (name, time) in sheet.backend().timings() {
@@ -57,9 +57,10 @@ fn main() {
         let spent = (time - old) / steps as f64;
         sum += spent;
         let stages = plan.step.iter().filter(|s| s.name == name && s.count > 0);
-        let floor: f64 = stages.map(|s| floor(&sheet, s, rates.bytes, rates.operations)).sum();
-        let share = if floor > 0.0 { format!("{:.0} %", 100.0 * floor / spent) } else { String::new() };
-        println!("{name:16} {:12.2} {:12.2} {share:>12}", 1e6 * spent, 1e6 * floor);
+        let floor = stages.map(|s| floor(&sheet, s, rates.bytes, rates.operations)).fold(0.0, |a, b| a + b);
+        // only the stages of every step have one
+        let floor = (floor > 0.0).then(|| format!("{:12.2} {:10.0} %", 1e6 * floor, 100.0 * floor / spent));
+        println!("{name:20} {:12.2} {}", 1e6 * spent, floor.unwrap_or_default());
     }
     println!("between dispatches: {:.0} % of the step", 100.0 * (1.0 - sum / step));
 }

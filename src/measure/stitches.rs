@@ -79,7 +79,8 @@ impl Tension {
             mean_n: sorted.clone().map(|(f, l)| f * l).sum::<f64>() / length_mm,
             max_n: sorted.clone().last().map_or(f64::NAN, |(f, _)| f),
             quantiles_n: QUANTILES.map(|q| quantile(q).map_or(f64::NAN, |(f, _)| f)),
-            slack_share: sorted.clone().filter(|(f, _)| *f < SLACK_BELOW_N).map(|(_, l)| l).sum::<f64>() / length_mm,
+            slack_share: sorted.clone().filter(|(f, _)| *f < SLACK_BELOW_N).fold(0.0, |sum, (_, l)| sum + l)
+                / length_mm,
         }
     }
 }
