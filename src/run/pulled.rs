@@ -9,8 +9,8 @@ use crate::simulate::Simulation;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
-/// Displacements that count as none, mm.
-const STILL: f64 = 1e-9;
+/// Way of the clamp, mm, below which a row has no mean force: it is part of the next row then.
+const STILL: f64 = 1e-5;
 /// Share of its length by which a specimen is pulled before its kinetic energy is judged: 5 mm of 240 mm.
 const SETTLED: f64 = 5.0 / 240.0;
 /// Displacements at which the last lines state forces, as shares of the largest one.
@@ -24,7 +24,7 @@ pub(super) struct Pulled {
     curve: Option<BiasCurve>,
     /// Whether each prescribed node is in the clamp that moves.
     moves: Vec<bool>,
-    /// Displacement, mm, and work of the clamps, mJ, at the last row.
+    /// Displacement, mm, and work of the clamps, mJ, up to which mean forces are known.
     last: [f64; 2],
     /// Displacement, mm, force of the machine, N, and F_nor, N/mm, at every row of the pull.
     rows: Vec<[f64; 3]>,
@@ -108,9 +108,13 @@ impl Pulled {
     /// motion is that of the machine. While the clamp stands still, it is the force at the end of the row.
     pub(super) fn row(&mut self, simulation: &Simulation, displacement: f64, zones: Option<Means>, pulls: bool) -> Row {
         let work = simulation.energies().prescribed;
-        let [from, done] = std::mem::replace(&mut self.last, [displacement, work]);
-        let force = if (displacement - from).abs() > STILL {
-            (work - done) / (displacement - from)
+        let [from, done] = self.last;
+        let way = displacement - from;
+        if way == 0.0 || way.abs() > STILL {
+            self.last = [displacement, work];
+        }
+        let force = if way.abs() > STILL {
+            (work - done) / way
         } else {
             let reactions = simulation.reactions();
             let moved = reactions.iter().zip(&self.moves).filter(|(_, moves)| **moves);
@@ -130,7 +134,7 @@ impl Pulled {
         } else if self.rows.is_empty() {
             self.before = self.now;
         }
-        Row { angle, theory: self.theory(), force, normalised }
+        Row { angle, theory: self.theory(displacement), force, normalised }
     }
 
     /// Whether the specimen has been pulled so far that its kinetic energy is judged.
@@ -138,9 +142,9 @@ impl Pulled {
         self.last[0] > SETTLED * self.length
     }
 
-    /// Angle of zone C without slip at the displacement of the last row, rad; NaN where no theory holds.
-    fn theory(&self) -> f64 {
-        self.bias.map_or(f64::NAN, |bias| bias.angle(self.last[0]))
+    /// Angle of zone C without slip, rad; NaN where no theory holds.
+    fn theory(&self, displacement: f64) -> f64 {
+        self.bias.map_or(f64::NAN, |bias| bias.angle(displacement))
     }
 
     /// Rows of the pull nearest to some displacements.
@@ -165,7 +169,7 @@ impl Pulled {
         };
         json!({
             "displacement_mm": self.last[0],
-            "theory_angle_deg": self.theory().to_degrees(),
+            "theory_angle_deg": self.theory(self.last[0]).to_degrees(),
             "before": reading(&self.before),
             "now": reading(&self.now),
             "largest_force_n": self.rows.iter().map(|row| row[1]).fold(f64::NAN, f64::max),
@@ -188,7 +192,7 @@ impl Pulled {
             .collect();
         let forces = if forces.is_empty() { "not pulled".into() } else { forces.join(", ") };
         let [a, b, c] = self.now.angle.map(f64::to_degrees);
-        let theory = match self.theory() {
+        let theory = match self.theory(self.last[0]) {
             angle if angle.is_nan() => String::new(),
             angle => format!(", {:.2}° in C without slip (Eq. 18)", angle.to_degrees()),
         };
