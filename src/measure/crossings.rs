@@ -5,6 +5,7 @@
 //! - the position is where the two mid-lines cross now, midway between them in z;
 //! - the effective shear angle is the angle between the mid-lines in the reference state less that now. The direction of
 //!   a mid-line at a section is that from the section before to the section after, linear in between;
+//! - directions are those of the mid-lines there, turned to point along the axis of the shear;
 //! - slip is the distance in the plane between the two material points;
 //! - widths and gaps are those of the nearest stations ([`yarns`](super::yarns)).
 //!
@@ -47,6 +48,8 @@ pub struct Crossing {
     pub position: [f64; 3],
     /// Effective shear angle, rad; NaN if the mid-lines cross no longer.
     pub angle: f64,
+    /// Directions of warp and weft along the axis, rad from x; NaN as well.
+    pub direction: [f64; 2],
     /// Way of the weft's material point from the warp's, mm.
     pub slip: [f64; 2],
     /// Width and gap of warp and weft at their nearest stations, mm.
@@ -105,12 +108,15 @@ impl Crossings {
             let nearest = stations.map(|(block, at)| (&yarns[block], station(&mesh.blocks[block], at)));
             let size =
                 |values: fn(&Yarn) -> &Vec<f64>| nearest.map(|(y, s)| values(y).get(s).copied().unwrap_or(f64::NAN));
-            let (position, angle) = hit.map_or(([f64::NAN; 3], f64::NAN), |Hit { at, place, .. }| {
+            let nowhere = ([f64::NAN; 3], f64::NAN, [f64::NAN; 2]);
+            let (position, angle, direction) = hit.map_or(nowhere, |Hit { at, place, .. }| {
                 let directions = [both[0].direction(at[0]), both[1].direction(at[1])];
                 let height = 0.5 * (both[0].point(at[0])[2] + both[1].point(at[1])[2]);
-                ([place[0], place[1], height], turn(directions, pair.signs, pair.side) - pair.rest)
+                let angle = turn(directions, pair.signs, pair.side) - pair.rest;
+                let along = [0, 1].map(|ply| directions[ply].map(|d| pair.signs[ply] * d)).map(|[x, y]| y.atan2(x));
+                ([place[0], place[1], height], angle, along)
             });
-            Crossing { position, angle, slip, width: size(|y| &y.width), gap: size(|y| &y.gap) }
+            Crossing { position, angle, direction, slip, width: size(|y| &y.width), gap: size(|y| &y.gap) }
         };
         Ok(self.pairs.iter().map(crossing).collect())
     }
@@ -299,6 +305,10 @@ mod tests {
             assert_eq!(crossings.len(), 8);
             for c in crossings {
                 assert!((c.angle - angle_of(gradient)).abs() < 1e-12, "{c:?}");
+                // warps run along y, wefts along x
+                let images = [1, 0].map(|k| gradient[1][k].atan2(gradient[0][k]));
+                let off = [0, 1].map(|ply| (c.direction[ply] - images[ply]).sin().abs());
+                assert!(off.iter().all(|o| *o < 1e-12), "{:?} {images:?}", c.direction);
                 assert!(c.slipped() < 1e-12 && c.position.iter().all(|x| x.is_finite()));
             }
         }

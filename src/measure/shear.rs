@@ -23,6 +23,7 @@
 //! which divided by W/2 is Eq. 19.
 
 use crate::error::{Error, Result};
+use crate::kernel::record::{Record, Recorded};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2};
 
 /// Trellis shear F̄(γ) = [[cos γ/2, sin γ/2], [sin γ/2, cos γ/2]]: both fibre directions keep their length.
@@ -141,6 +142,12 @@ impl BiasCurve {
         let f = (force * lever - half * rest) / (own + half * own_share);
         self.known.push((angle, f));
         f
+    }
+}
+
+impl Recorded for BiasCurve {
+    fn record(&mut self, record: &mut Record) {
+        self.known.record(record);
     }
 }
 

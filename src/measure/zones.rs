@@ -71,12 +71,50 @@ impl Strip {
     }
 }
 
-/// Spread of the effective shear angle in zones A, B and C, rad, over the crossings of which a zone is given.
-pub fn angles(crossings: &[Crossing], zones: &[Option<Zone>]) -> [Spread; 3] {
+/// Spread of a value in zones A, B and C, over the crossings of which a zone is given.
+pub fn spreads(crossings: &[Crossing], zones: &[Option<Zone>], value: impl Fn(&Crossing) -> f64 + Copy) -> [Spread; 3] {
     [Zone::A, Zone::B, Zone::C].map(|zone| {
         let own = crossings.iter().zip(zones).filter(move |(_, z)| **z == Some(zone));
-        Spread::of(own.map(|(c, _)| c.angle))
+        Spread::of(own.map(move |(c, _)| value(c)))
     })
+}
+
+/// Spread of the effective shear angle in zones A, B and C, rad.
+pub fn angles(crossings: &[Crossing], zones: &[Option<Zone>]) -> [Spread; 3] {
+    spreads(crossings, zones, |c| c.angle)
+}
+
+/// What is read off the zones of a specimen: means over the crossings of which a zone is given, NaN where there are none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Means {
+    /// Effective shear angle in zones A, B and C, rad, and its standard deviation.
+    pub angle: [f64; 3],
+    pub angle_std: [f64; 3],
+    /// Slip of the plies in zones A, B and C, mm.
+    pub slip: [f64; 3],
+    /// Sizes of warp and weft in zone C, mm.
+    pub width: [f64; 2],
+    pub gap: [f64; 2],
+    pub broadness: [f64; 2],
+    /// Directions of warp and weft in zone C, rad from x.
+    pub direction: [f64; 2],
+}
+
+impl Means {
+    pub fn of(crossings: &[Crossing], zones: &[Option<Zone>]) -> Self {
+        let angle = angles(crossings, zones);
+        let central =
+            |value: fn(&Crossing) -> [f64; 2]| [0, 1].map(|ply| spreads(crossings, zones, |c| value(c)[ply])[2].mean);
+        Self {
+            angle: angle.map(|a| a.mean),
+            angle_std: angle.map(|a| a.std),
+            slip: spreads(crossings, zones, Crossing::slipped).map(|s| s.mean),
+            width: central(|c| c.width),
+            gap: central(|c| c.gap),
+            broadness: central(|c| [0, 1].map(|ply| c.width[ply] + c.gap[ply])),
+            direction: central(|c| c.direction),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -101,6 +139,24 @@ mod tests {
         for (got, wanted) in area.into_iter().zip([3200.0, 6400.0, 9600.0]) {
             assert!((got - wanted).abs() < 0.01 * wanted, "{area:?}");
         }
+    }
+
+    #[test]
+    fn means_are_those_of_the_crossings_of_each_zone() {
+        let crossing = |angle: f64, gap: f64| Crossing {
+            position: [0.0; 3],
+            angle,
+            direction: [0.1, -0.1],
+            slip: [0.3, 0.4],
+            width: [4.0, 2.0],
+            gap: [gap, f64::NAN],
+        };
+        let crossings = [crossing(0.1, 0.2), crossing(0.5, 0.3), crossing(0.7, 0.5), crossing(9.0, 9.0)];
+        let means = Means::of(&crossings, &[Some(Zone::A), Some(Zone::C), Some(Zone::C), None]);
+        assert!((means.angle[2] - 0.6).abs() < 1e-15 && (means.angle_std[2] - 0.1).abs() < 1e-15);
+        assert!(means.angle[0] == 0.1 && means.angle[1].is_nan() && means.slip[2] == 0.5);
+        assert!((means.gap[0] - 0.4).abs() < 1e-15 && (means.broadness[0] - 4.4).abs() < 1e-15);
+        assert!(means.gap[1].is_nan() && means.width == [4.0, 2.0] && means.direction == [0.1, -0.1]);
     }
 
     #[test]

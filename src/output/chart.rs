@@ -80,22 +80,28 @@ pub fn curves(axis: [&str; 2], curves: &[Curve]) -> Option<String> {
     Some(t)
 }
 
-/// Points in the plane, mm, coloured by a value, with the range of their colours; `None` if there is no point.
-pub fn map(name: &str, points: &[[f64; 3]]) -> Option<String> {
+/// Points in the plane, mm, coloured by a value, with the range of their colours; `None` if there is no point. Without a
+/// `range`, it is that of the values.
+pub fn map(name: &str, points: &[[f64; 3]], range: Option<[f64; 2]>) -> Option<String> {
     let known: Vec<&[f64; 3]> = points.iter().filter(|p| p.iter().all(|x| x.is_finite())).collect();
     let extent = |k: usize| known.iter().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
     known.first()?;
-    let ([x0, x1], [y0, y1], [low, high]) = (extent(0).into(), extent(1).into(), extent(2).into());
+    let ([x0, x1], [y0, y1]): ([f64; 2], [f64; 2]) = (extent(0).into(), extent(1).into());
+    let [low, high] = range.unwrap_or(extent(2).into());
     let (wide, tall): (f64, f64) = (x1 - x0, y1 - y0);
     let spacing = (wide.max(1.0) * tall.max(1.0) / known.len() as f64).sqrt();
     let (wide, tall) = (wide + 2.0 * spacing, tall + 2.0 * spacing);
     let scale = (WIDTH / wide).min(400.0 / tall);
     let (left, height) = (0.5 * (WIDTH - scale * wide), scale * tall + 44.0);
-    let radius = (0.45 * spacing * scale).clamp(1.5, 16.0);
+    let radius = (0.36 * spacing * scale).clamp(1.5, 16.0);
     let mut t =
         format!("<svg viewBox=\"0 0 {WIDTH} {height:.0}\" role=\"img\" aria-label=\"map of {}\">", escaped(name));
     let shade = |v: f64| {
-        let [r, g, b] = colour::encode(colour::map(if high > low { ((v - low) / (high - low)) as f32 } else { 0.5 }));
+        let [r, g, b] = colour::encode(colour::map(if high > low {
+            ((v - low) / (high - low)).clamp(0.0, 1.0) as f32
+        } else {
+            0.5
+        }));
         format!("#{r:02x}{g:02x}{b:02x}")
     };
     // writing to a String does not fail
@@ -114,7 +120,8 @@ pub fn map(name: &str, points: &[[f64; 3]]) -> Option<String> {
             110.0 + 5.0 * f64::from(k)
         );
     }
-    let ends = [low, high];
+    // to a twentieth of the range
+    let ends = [high, high - (high - low) / 20.0];
     let _ = write!(t, "<text x=\"102\" y=\"{:.1}\" class=\"e\">{}</text>", bar + 9.5, label(low, &ends));
     let _ = write!(t, "<text x=\"418\" y=\"{:.1}\">{}</text>", bar + 9.5, label(high, &ends));
     let _ = write!(t, "<text x=\"260\" y=\"{:.1}\" class=\"m\">{}</text></svg>", bar + 27.0, escaped(name));
@@ -171,7 +178,14 @@ mod tests {
         assert!(svg.contains(&format!("M{left:.1} {bottom:.1}M")) && svg.contains(&format!("L{right:.1} ")), "{svg}");
         assert!(svg.contains("a &lt; b"));
         assert!(curves(["x", "y"], &[Curve { name: "a", points: vec![[f64::NAN, 1.0]] }]).is_none());
-        assert!(map("γ", &[]).is_none());
-        assert_eq!(map("γ", &[[0.0, 0.0, 1.0], [1.0, 0.0, 2.0]]).unwrap().matches("<circle").count(), 2);
+        assert!(map("γ", &[], None).is_none());
+        let points = [[0.0, 0.0, 1.0], [1.0, 0.0, 2.0], [2.0, 0.0, 9.0]];
+        assert_eq!(map("γ", &points, None).unwrap().matches("<circle").count(), 3);
+        let colours = |svg: &str| {
+            let fills = svg.split("fill=\"").skip(1).map(|f| f[..7].to_owned());
+            fills.take(3).collect::<Vec<_>>()
+        };
+        let [whole, part] = [None, Some([1.0, 2.0])].map(|range| colours(&map("γ", &points, range).unwrap()));
+        assert!(whole[1] != whole[2] && part[1] == part[2], "values beyond the range have the colour of its end");
     }
 }

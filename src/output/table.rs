@@ -88,7 +88,7 @@ pub const STITCHES: &[&str] = &[
     "underlap_slack_share",
 ];
 
-/// Columns of `shear.csv`: prescribed angle, effective angles at the crossings of warp and weft, and slip of the plies there.
+/// Columns of `shear.csv`: effective angles at all crossings of warp and weft, and slip of the plies there.
 pub const SHEAR: &[&str] = &[
     "time_s",
     "shear_angle_deg",
@@ -101,10 +101,35 @@ pub const SHEAR: &[&str] = &[
     "slip_max_mm",
 ];
 
-/// Columns of `crossings.csv`: every crossing at every frame.
+/// Further columns of `shear.csv` for a specimen: the angle of zone C without slip (Eq. 18), then means over the crossings well
+/// inside each zone.
+pub const ZONES: &[&str] = &[
+    "theory_angle_deg",
+    "zone_a_angle_deg",
+    "zone_b_angle_deg",
+    "zone_c_angle_deg",
+    "zone_a_angle_std_deg",
+    "zone_b_angle_std_deg",
+    "zone_c_angle_std_deg",
+    "zone_a_slip_mm",
+    "zone_b_slip_mm",
+    "zone_c_slip_mm",
+    "zone_c_warp_width_mm",
+    "zone_c_weft_width_mm",
+    "zone_c_warp_gap_mm",
+    "zone_c_weft_gap_mm",
+    "zone_c_warp_broadness_mm",
+    "zone_c_weft_broadness_mm",
+    "zone_c_warp_direction_deg",
+    "zone_c_weft_direction_deg",
+];
+
+/// Columns of `crossings.csv`: every crossing at every frame. Zones are A, B and C of a specimen, and `none` elsewhere.
 pub const CROSSINGS: &[&str] = &[
     "time_s",
     "shear_angle_deg",
+    "displacement_mm",
+    "zone",
     "warp",
     "weft",
     "reference_x_mm",
@@ -113,6 +138,8 @@ pub const CROSSINGS: &[&str] = &[
     "y_mm",
     "z_mm",
     "effective_angle_deg",
+    "warp_direction_deg",
+    "weft_direction_deg",
     "slip_x_mm",
     "slip_y_mm",
     "warp_width_mm",

@@ -5,8 +5,10 @@ mod crossings;
 mod devices;
 mod mesh;
 mod picture;
+mod pulled;
 mod report;
 mod resume;
+mod rows;
 mod summary;
 
 pub use check::check;
@@ -22,7 +24,7 @@ use crate::case::read::Loaded;
 use crate::case::steps::{Precision, Step};
 use crate::error::{Error, Result};
 use crate::fabric;
-use crate::measure::{shear, stitches, yarns};
+use crate::measure::yarns;
 use crate::mesh::{Mesh, Ply};
 use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH};
 use crate::output::{directory, file, vtu};
@@ -30,7 +32,9 @@ use crate::simulate::{Make, Simulation};
 use crossings::Crossed;
 use indicatif::{ProgressBar, ProgressStyle};
 use picture::draw;
+use pulled::Pulled;
 use resume::Start;
+use rows::STRESS;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -160,17 +164,21 @@ struct Run<'a> {
     stopped: Arc<AtomicBool>,
     history: Table,
     energies: Table,
-    stress: Table,
+    /// Of a periodic cell.
+    stress: Option<Table>,
     contacts: Table,
     yarns: Option<[Table; 2]>,
     stitches: Option<Table>,
     crossings: Option<Crossed>,
+    /// Of a specimen.
+    pulled: Option<Pulled>,
     frames: Vec<(f64, String)>,
     pictures: Vec<String>,
+    /// Shear angle, degrees, and F_nor, N/mm, at the rows of shear of a cell.
     curve: Vec<(f64, f64)>,
     /// Largest prescribed displacement, mm.
     reach: f64,
-    /// Shear angle (rad) and external work (mJ) at the last row.
+    /// Shear angle (rad) and external work (mJ) of a cell at the last row.
     last_shear: [f64; 2],
     /// Mean width, thickness and gap of warp and weft before shear, mm.
     settled: Option<[[f64; 3]; 2]>,
@@ -204,23 +212,6 @@ fn reach(domain: &Domain) -> f64 {
     }
 }
 
-/// Angle after which the kinetic energy of shear is judged, degrees.
-const SETTLED_DEG: f64 = 2.0;
-/// Components of V P̄/V₀ in `stress.csv`.
-const STRESS: [&str; 11] = [
-    "time_s",
-    "shear_angle_deg",
-    "p_xx_n_per_mm",
-    "p_xy_n_per_mm",
-    "p_xz_n_per_mm",
-    "p_yx_n_per_mm",
-    "p_yy_n_per_mm",
-    "p_yz_n_per_mm",
-    "p_zx_n_per_mm",
-    "p_zy_n_per_mm",
-    "p_zz_n_per_mm",
-];
-
 impl<'a> Run<'a> {
     fn new(loaded: &'a Loaded, options: &'a Options, simulation: Simulation, stopped: Arc<AtomicBool>) -> Result<Self> {
         let dir = &options.output;
@@ -242,11 +233,15 @@ impl<'a> Run<'a> {
             options,
             history: table("history.csv", HISTORY)?,
             energies: table("energies.csv", &energies)?,
-            stress: table("stress.csv", &STRESS)?,
+            stress: if mesh.period.is_some() { Some(table("stress.csv", &STRESS)?) } else { None },
             contacts: table("contacts.csv", CONTACTS)?,
             yarns: if plies { Some([table("yarns.csv", YARNS)?, table("yarns_each.csv", YARNS_EACH)?]) } else { None },
             stitches: if threads { Some(table("stitches.csv", STITCHES)?) } else { None },
-            crossings: Crossed::of(&simulation.mesh, table)?,
+            crossings: Crossed::of(&loaded.case.domain, mesh, table)?,
+            pulled: match &loaded.case.domain {
+                Domain::Specimen(specimen) => Some(Pulled::of(specimen, &simulation)),
+                _ => None,
+            },
             simulation,
             stopped,
             frames: Vec::new(),
@@ -366,122 +361,19 @@ impl<'a> Run<'a> {
         let s = &self.simulation;
         let e = s.energies();
         bar.set_position((s.time() / s.schedule.end() * 1e6) as u64);
+        let load = s.load();
+        let loaded = match s.mesh.period {
+            Some(_) => format!("γ {:.1}°", load.angle.to_degrees()),
+            None => format!("d {:.2} mm", load.motion * self.reach),
+        };
         bar.set_message(format!(
-            "{phase} γ {:.1}° step {} dt {:.2e} s, internal {:.3e} mJ, kinetic {:.1e} mJ, balance {:+.2} %",
-            s.load().angle.to_degrees(),
+            "{phase} {loaded} step {} dt {:.2e} s, internal {:.3e} mJ, kinetic {:.1e} mJ, balance {:+.2} %",
             s.step(),
             s.dt(),
             e.internal(),
             e.kinetic,
             100.0 * s.health().balance
         ));
-    }
-
-    /// One row in every table.
-    fn write_row(&mut self, phase: &str) -> Result<()> {
-        let s = &mut self.simulation;
-        let stress = s.take_stress().unwrap_or_default();
-        let angle = s.load().angle;
-        let (time, degrees) = (s.time(), angle.to_degrees());
-        let area = s.mesh.period.map_or(f64::NAN, |[x, y]| x * y);
-        let plane = [[stress[0][0], stress[0][1]], [stress[1][0], stress[1][1]]];
-        let work = s.energies().external;
-        let [before, done] = std::mem::replace(&mut self.last_shear, [angle, work]);
-        let turned = libm::sin(angle) - libm::sin(before);
-        let force = if s.mesh.period.is_none() {
-            f64::NAN
-        } else if turned.abs() > 1e-9 {
-            // the mean over the row: ∫ A₀ F_nor cos γ dγ is the external work
-            (work - done) / (area * turned)
-        } else {
-            shear::normalised_force(plane, angle, area)
-        };
-        let reaction = s.reactions().iter().fold([0.0; 3], |sum, f| [0, 1, 2].map(|k| sum[k] + f[k]));
-        let reaction = libm::sqrt(reaction.iter().map(|f| f * f).sum());
-        let (e, h) = (*s.energies(), *s.health());
-        let motion = s.load().motion;
-        s.alive()?;
-        self.worst_balance = self.worst_balance.max(h.balance.abs());
-        self.dt_range = [self.dt_range[0].min(s.dt()), self.dt_range[1].max(s.dt())];
-        for (largest, now) in self.largest_added.iter_mut().zip(h.added_mass) {
-            *largest = largest.max(now);
-        }
-        if phase == "shear" {
-            self.curve.push((degrees, force));
-            if degrees.abs() > SETTLED_DEG {
-                self.worst_kinetic = self.worst_kinetic.max(e.kinetic_total / e.internal());
-            }
-        }
-        let penetration = h.penetration.into_iter().fold(0.0, f64::max);
-        self.history.row(&[
-            time.into(),
-            (s.step() as f64).into(),
-            phase.into(),
-            s.dt().into(),
-            degrees.into(),
-            (motion * self.reach).into(),
-            reaction.into(),
-            force.into(),
-            e.internal().into(),
-            e.kinetic_total.into(),
-            h.balance.into(),
-            penetration.into(),
-            h.min_jacobian.into(),
-        ])?;
-        let numbers: Vec<f64> = [time, degrees].into_iter().chain(e.columns().map(|(_, value)| value)).collect();
-        self.energies.numbers(&numbers)?;
-        let numbers: Vec<f64> =
-            [time, degrees].into_iter().chain(stress.concat().into_iter().map(|p| p / area)).collect();
-        self.stress.numbers(&numbers)?;
-        let counts = h.touching.map(f64::from);
-        let numbers: Vec<f64> = [&[time, degrees][..], &counts, &h.penetration, &h.added_mass, &[h.dt_limit]].concat();
-        self.contacts.numbers(&numbers)?;
-        if let Some([table, each]) = &mut self.yarns {
-            let frame = s.frame();
-            s.alive()?;
-            let yarns = yarns::measure(&s.mesh, &frame)?;
-            if let Some(crossings) = &mut self.crossings {
-                crossings.write_row(&s.mesh, &frame, &yarns, motion * self.reach)?;
-            }
-            let plies = [Ply::Warp, Ply::Weft].map(|ply| yarns::ply(&yarns, ply));
-            let means = plies.map(|p| [p.width.mean, p.thickness.mean, p.gap.mean]);
-            let spreads = plies.map(|p| [p.width.std, p.thickness.std, p.gap.std]);
-            let broadness = plies.map(|p| p.broadness.mean);
-            let numbers = [&[time, degrees][..], &means.concat(), &spreads.concat(), &broadness].concat();
-            table.numbers(&numbers)?;
-            for yarn in &yarns {
-                let sizes = yarn.sizes();
-                each.row(&[
-                    time.into(),
-                    degrees.into(),
-                    s.mesh.blocks[yarn.block].name.as_str().into(),
-                    sizes.width.mean.into(),
-                    sizes.thickness.mean.into(),
-                    sizes.gap.mean.into(),
-                    sizes.broadness.mean.into(),
-                    sizes.width.min.into(),
-                    sizes.width.max.into(),
-                ])?;
-            }
-        }
-        if let Some(table) = &mut self.stitches {
-            let tensions = s.tensions();
-            s.alive()?;
-            let t = stitches::measure(&s.mesh, &tensions)?;
-            table.numbers(&[
-                time,
-                degrees,
-                t.all.min_n,
-                t.all.mean_n,
-                t.all.max_n,
-                t.all.slack_share,
-                t.loops.mean_n,
-                t.loops.slack_share,
-                t.underlaps.mean_n,
-                t.underlaps.slack_share,
-            ])?;
-        }
-        Ok(())
     }
 
     /// A frame for ParaView, and a picture of it.
@@ -496,7 +388,7 @@ impl<'a> Run<'a> {
         vtu::write_collection(&dir.join("run.pvd"), &self.frames)?;
         if let Some(crossings) = &mut self.crossings {
             let map = format!("frames/{:04}-{name}.vtp", self.frames.len() - 1);
-            crossings.write_frame(&s.mesh, &frame, dir, map)?;
+            crossings.write_frame(&s.mesh, &frame, s.load().motion * self.reach, dir, map)?;
         }
         if self.loaded.case.output.pictures {
             let file = format!("{:04}-{name}.png", self.frames.len() - 1);

@@ -2,6 +2,7 @@
 //! made from the files in the folder alone, so that a run that still goes on can be looked at too.
 
 use super::CASE;
+use super::summary::{PX35, TOMOGRAPHY};
 use crate::case::parse;
 use crate::error::{Error, Result};
 use crate::output::chart::{self, Curve};
@@ -20,9 +21,12 @@ const JACOBIAN: f64 = 0.1;
 const ADDED: f64 = 0.1;
 /// Rows of the table of the curve.
 const ROWS: usize = 16;
-/// Sizes of the PX35 fabric by tomography: warp and weft, width, thickness and gap, mm.
-const PX35: [[&str; 3]; 2] =
-    [["4.59 ± 0.13", "0.38 ± 0.06", "0.39 ± 0.10"], ["2.08 ± 0.08", "0.38 ± 0.04", "0.40 ± 0.04"]];
+/// Frames of a specimen whose crossings are mapped, the last one included.
+const MAPS: usize = 3;
+/// Share of the values at each end that the colours of a specimen's maps leave out: gaps at its edges are no gaps.
+const OUTER: f64 = 0.02;
+/// Rows of the table that compares the zones with the theory.
+const COMPARED: usize = 8;
 
 /// Writes the report of the run in a folder.
 ///
@@ -46,6 +50,7 @@ pub fn report(dir: &Path, out: &Path) -> Result<String> {
     }
     results.sizes(&mut page)?;
     results.curves(&mut page)?;
+    results.zones(&mut page)?;
     results.crossings(&mut page)?;
     results.table(&mut page);
     if let Some((_, before @ [_, ..])) = pictures.split_last() {
@@ -82,6 +87,12 @@ const OVER_ANGLE: Axis =
     Axis { label: "shear angle γ, degrees", column: "shear_angle_deg", factor: 1.0, phase: Some("shear") };
 const OVER_DISPLACEMENT: Axis =
     Axis { label: "displacement, mm", column: "displacement_mm", factor: 1.0, phase: Some("move") };
+const OVER_EFFECTIVE: Axis = Axis {
+    label: "effective shear angle in zone C, degrees",
+    column: "shear_angle_deg",
+    factor: 1.0,
+    phase: Some("move"),
+};
 const OVER_TIME: Axis = Axis { label: "time, ms", column: "time_s", factor: 1e3, phase: None };
 
 impl Results<'_> {
@@ -93,6 +104,10 @@ impl Results<'_> {
     fn other(&self, name: &str) -> Result<Option<Columns>> {
         let path = self.dir.join(name);
         path.is_file().then(|| Columns::read(&path)).transpose()
+    }
+
+    fn is_specimen(&self) -> bool {
+        self.case["domain"]["specimen"].is_object()
     }
 
     fn axis(&self) -> Axis {
@@ -149,7 +164,7 @@ impl Results<'_> {
         let kinetic = self.number("worst_kinetic_over_internal_in_shear");
         if kinetic > KINETIC {
             found.push(format!(
-                "Kinetic energy reaches {:.1} % of internal energy in shear (above {:.0} %): load more slowly.",
+                "Kinetic energy reaches {:.1} % of internal energy under load (above {:.0} %): load more slowly.",
                 100.0 * kinetic,
                 100.0 * KINETIC
             ));
@@ -192,7 +207,7 @@ impl Results<'_> {
         let loaded = phases.iter().position(|p| matches!(*p, "shear" | "move")).unwrap_or(phases.len());
         let last = yarns.len().min(phases.len()) - 1;
         let before = loaded.checked_sub(1).map(|row| row.min(last));
-        let known = self.case["fabric"]["name"].as_str().is_some_and(|name| name.contains("PX35"));
+        let known = self.case["fabric"]["name"].as_str().is_some_and(|name| name.contains(PX35));
         let rows = ["warp", "weft"].into_iter().enumerate().flat_map(|(ply, name)| {
             let yarns = &yarns;
             ["width", "thickness", "gap"].into_iter().enumerate().map(move |(k, size)| {
@@ -200,7 +215,7 @@ impl Results<'_> {
                 let spread = yarns.numbers(&format!("{name}_{size}_std_mm"));
                 let at =
                     |row: Option<usize>| row.map_or("–".into(), |r| format!("{:.3} ± {:.3}", values[r], spread[r]));
-                let target = if known { PX35[ply][k] } else { "–" };
+                let target = if known { TOMOGRAPHY[ply][k] } else { "–" };
                 vec![format!("{name} {size}"), at(before), target.into(), at(Some(last))]
             })
         });
@@ -213,64 +228,13 @@ impl Results<'_> {
     }
 
     fn curves(&self, page: &mut Page) -> Result<()> {
-        let axis = self.axis();
         page.heading("Curves");
         page.raw("<div class=\"charts\">");
-        let mut chart =
-            |table: &Columns, axis: &Axis, title: &str, unit: &str, columns: &[(&str, &str)], caption: &str| {
-                let curves: Vec<Curve> = columns
-                    .iter()
-                    .map(|(column, name)| Curve { name, points: self.points(table, axis, column) })
-                    .collect();
-                if let Some(svg) = chart::curves([axis.label, unit], &curves) {
-                    page.figure(&format!("{title}, {unit}"), &svg, caption);
-                }
-            };
         let history = &self.history;
-        if axis.column == OVER_ANGLE.column {
-            let force = [("f_nor_n_per_mm", "F_nor")];
-            chart(
-                history,
-                &axis,
-                "Shear force",
-                "N/mm",
-                &force,
-                "External work per area and angle over cos γ, mean over each row.",
-            );
+        if self.is_specimen() {
+            self.specimen_curves(page)?;
         } else {
-            let caption = "Size of the sum of the forces on prescribed nodes.";
-            chart(history, &axis, "Force", "N", &[("force_n", "force")], caption);
-        }
-        if let Some(shear) = self.other("shear.csv")? {
-            let angles = [
-                ("effective_angle_mean_deg", "mean"),
-                ("effective_angle_min_deg", "smallest"),
-                ("effective_angle_max_deg", "largest"),
-            ];
-            chart(
-                &shear,
-                &axis,
-                "Effective shear angle",
-                "degrees",
-                &angles,
-                "Between the mid-lines at the crossings of warp and weft.",
-            );
-            let slips = [("slip_mean_mm", "mean"), ("slip_max_mm", "largest")];
-            chart(
-                &shear,
-                &axis,
-                "Slip of the plies",
-                "mm",
-                &slips,
-                "Between the material points of both yarns at a crossing.",
-            );
-        }
-        if let Some(yarns) = self.other("yarns.csv")? {
-            let of = |size: &str| ["warp", "weft"].map(|ply| format!("{ply}_{size}_mm"));
-            for (size, title) in [("gap", "Gaps"), ("width", "Widths")] {
-                let [warp, weft] = of(size);
-                chart(&yarns, &axis, title, "mm", &[(&warp, "warp"), (&weft, "weft")], "Means over all stations.");
-            }
+            self.cell_curves(page)?;
         }
         if let Some(stitches) = self.other("stitches.csv")? {
             let tensions = [
@@ -279,41 +243,151 @@ impl Results<'_> {
                 ("underlap_tension_mean_n", "underlaps"),
                 ("tension_max_n", "largest"),
             ];
-            chart(&stitches, &OVER_TIME, "Tension of the stitch", "N", &tensions, "Weighted by length.");
-            chart(
-                &stitches,
-                &OVER_TIME,
-                "Slack",
-                "share",
-                &[("slack_share", "share of slack thread")],
-                "By length, below 0.02 N.",
-            );
+            self.chart(page, &stitches, &OVER_TIME, ["Tension of the stitch", "N"], &tensions, "Weighted by length.");
+            let slack = [("slack_share", "all"), ("loop_slack_share", "loops"), ("underlap_slack_share", "underlaps")];
+            let caption = "Share of slack thread by length, below 0.02 N.";
+            self.chart(page, &stitches, &OVER_TIME, ["Slack", "share"], &slack, caption);
         }
         let energies = [("e_internal_mj", "internal"), ("e_kinetic_mj", "kinetic")];
-        chart(history, &OVER_TIME, "Energies", "mJ", &energies, "Strain energy of yarns and threads; kinetic energy.");
-        chart(
-            history,
-            &OVER_TIME,
-            "Energy balance",
-            "share",
-            &[("e_balance_error", "error")],
-            "What is unaccounted for.",
-        );
+        let caption = "Strain energy of yarns and threads; kinetic energy.";
+        self.chart(page, history, &OVER_TIME, ["Energies", "mJ"], &energies, caption);
+        let balance = [("e_balance_error", "error")];
+        self.chart(page, history, &OVER_TIME, ["Energy balance", "share"], &balance, "What is unaccounted for.");
         page.raw("</div>");
         Ok(())
     }
 
-    /// Maps of the crossings at the last frame.
+    /// A chart of columns of a table with a row for each row of the history: title and unit, columns with their names.
+    fn chart(
+        &self,
+        page: &mut Page,
+        table: &Columns,
+        axis: &Axis,
+        [title, unit]: [&str; 2],
+        columns: &[(&str, &str)],
+        caption: &str,
+    ) {
+        let curves: Vec<Curve> =
+            columns.iter().map(|(column, name)| Curve { name, points: self.points(table, axis, column) }).collect();
+        if let Some(svg) = chart::curves([axis.label, unit], &curves) {
+            page.figure(&format!("{title}, {unit}"), &svg, caption);
+        }
+    }
+
+    /// What a cell, or a free scene, is asked for.
+    fn cell_curves(&self, page: &mut Page) -> Result<()> {
+        let (axis, history) = (self.axis(), &self.history);
+        if axis.column == OVER_ANGLE.column {
+            let force = [("f_nor_n_per_mm", "F_nor")];
+            let caption = "External work per area and angle over cos γ, mean over each row.";
+            self.chart(page, history, &axis, ["Shear force", "N/mm"], &force, caption);
+        } else {
+            let caption = "Size of the sum of the forces on prescribed nodes.";
+            self.chart(page, history, &axis, ["Force", "N"], &[("force_n", "force")], caption);
+        }
+        if let Some(shear) = self.other("shear.csv")? {
+            let angles = [
+                ("effective_angle_mean_deg", "mean"),
+                ("effective_angle_min_deg", "smallest"),
+                ("effective_angle_max_deg", "largest"),
+            ];
+            let caption = "Between the mid-lines at the crossings of warp and weft.";
+            self.chart(page, &shear, &axis, ["Effective shear angle", "degrees"], &angles, caption);
+            let slips = [("slip_mean_mm", "mean"), ("slip_max_mm", "largest")];
+            let caption = "Between the material points of both yarns at a crossing.";
+            self.chart(page, &shear, &axis, ["Slip of the plies", "mm"], &slips, caption);
+        }
+        if let Some(yarns) = self.other("yarns.csv")? {
+            for (size, title) in [("gap", "Gaps"), ("width", "Widths")] {
+                let [warp, weft] = ["warp", "weft"].map(|ply| format!("{ply}_{size}_mm"));
+                let columns = [(warp.as_str(), "warp"), (&weft, "weft")];
+                self.chart(page, &yarns, &axis, [title, "mm"], &columns, "Means over all stations.");
+            }
+        }
+        Ok(())
+    }
+
+    /// What a specimen is asked for.
+    fn specimen_curves(&self, page: &mut Page) -> Result<()> {
+        let (axis, history) = (self.axis(), &self.history);
+        let caption = "Of the clamp that moves, along the pull, mean over each row.";
+        self.chart(page, history, &axis, ["Force of the machine", "N"], &[("force_n", "force")], caption);
+        // an angle that falls back for a moment has no F_nor: the line goes on behind it
+        let known = |p: &[f64; 2]| p[1].is_finite();
+        let points = self.points(history, &OVER_EFFECTIVE, "f_nor_n_per_mm").into_iter().filter(known).collect();
+        if let Some(svg) = chart::curves([OVER_EFFECTIVE.label, "N/mm"], &[Curve { name: "F_nor", points }]) {
+            let caption =
+                "Eq. 19 with the effective angle: it presumes zones sheared by nothing, half and all of that angle.";
+            page.figure("Shear force, N/mm", &svg, caption);
+        }
+        let Some(shear) = self.other("shear.csv")? else { return Ok(()) };
+        let angles = [("zone_c_angle_deg", "effective"), ("theory_angle_deg", "without slip (Eq. 18)")];
+        let caption = "Mean over the crossings well inside zone C, beside the theory of yarns that do not slide.";
+        self.chart(page, &shear, &axis, ["Shear angle in zone C", "degrees"], &angles, caption);
+        let zones = [("zone_a_angle_deg", "A"), ("zone_b_angle_deg", "B"), ("zone_c_angle_deg", "C")];
+        let caption = "Effective angles. Without slip, A has none and B half of that in C.";
+        self.chart(page, &shear, &axis, ["Shear angle by zone", "degrees"], &zones, caption);
+        let slips =
+            [("zone_a_slip_mm", "A"), ("zone_b_slip_mm", "B"), ("zone_c_slip_mm", "C"), ("slip_max_mm", "largest")];
+        let caption = "Between the material points of both yarns at a crossing: means by zone, and the largest of all.";
+        self.chart(page, &shear, &axis, ["Slip of the plies", "mm"], &slips, caption);
+        for (size, title) in
+            [("gap", "Gaps in zone C"), ("width", "Widths in zone C"), ("broadness", "Broadness in zone C")]
+        {
+            let [warp, weft] = ["warp", "weft"].map(|ply| format!("zone_c_{ply}_{size}_mm"));
+            let columns = [(warp.as_str(), "warp"), (&weft, "weft")];
+            self.chart(page, &shear, &OVER_EFFECTIVE, [title, "mm"], &columns, "Means over the crossings well inside.");
+        }
+        Ok(())
+    }
+
+    /// Zones of a specimen beside the theory, at evenly chosen rows of the pull.
+    fn zones(&self, page: &mut Page) -> Result<()> {
+        let Some(shear) = self.other("shear.csv")?.filter(|_| self.is_specimen()) else { return Ok(()) };
+        let phases = self.history.texts("phase");
+        let rows: Vec<usize> = (0..phases.len().min(shear.len())).filter(|r| phases[*r] == "move").collect();
+        let Some(last) = rows.len().checked_sub(1) else { return Ok(()) };
+        let columns = [
+            "displacement_mm",
+            "theory_angle_deg",
+            "zone_c_angle_deg",
+            "zone_c_angle_std_deg",
+            "zone_b_angle_deg",
+            "zone_a_angle_deg",
+            "zone_c_slip_mm",
+        ];
+        let cells = columns.map(|column| shear.texts(column));
+        let count = COMPARED.min(rows.len());
+        let body: Vec<Vec<String>> =
+            (1..=count).map(|k| cells.iter().map(|column| short(column[rows[last * k / count]])).collect()).collect();
+        page.heading("Zones beside the theory");
+        page.table(&["displacement, mm", "Eq. 18, °", "C, °", "± in C, °", "B, °", "A, °", "slip in C, mm"], &body);
+        page.paragraph(
+            "soft",
+            "Effective angles, means over the crossings well inside each zone. Without slip, C follows Eq. 18.",
+        );
+        Ok(())
+    }
+
+    /// Maps of the crossings: at the last frame, and at some before it where a specimen is pulled.
     fn crossings(&self, page: &mut Page) -> Result<()> {
         let Some(table) = self.other("crossings.csv")?.filter(|t| !t.is_empty()) else { return Ok(()) };
         let times = table.texts("time_s");
-        let last = times[times.len() - 1];
-        let of = |column: &str| {
-            let values = table.numbers(column).into_iter().zip(&times);
-            values.filter(|(_, time)| **time == last).map(|(v, _)| v).collect::<Vec<_>>()
-        };
-        let (x, y) = (of("x_mm"), of("y_mm"));
-        page.heading("Crossings at the last frame");
+        let mut frames = times.clone();
+        frames.dedup();
+        let pulled = self.is_specimen();
+        let displacements = table.numbers("displacement_mm");
+        let place = |time: &str| times.iter().position(|t| *t == time).map_or(f64::NAN, |row| displacements[row]);
+        if pulled {
+            frames.retain(|time| place(time) > 0.0);
+        }
+        if frames.is_empty() {
+            frames.push(times[times.len() - 1]);
+        }
+        let (count, last) = (if pulled { MAPS.min(frames.len()) } else { 1 }, frames.len() - 1);
+        let chosen: Vec<&str> = (1..=count).map(|k| frames[last * k / count]).collect();
+        let (x, y) = (table.numbers("x_mm"), table.numbers("y_mm"));
+        page.heading(if pulled { "Crossings while the specimen is pulled" } else { "Crossings at the last frame" });
         page.raw("<div class=\"charts\">");
         let maps = [
             ("effective_angle_deg", "effective shear angle, degrees"),
@@ -321,9 +395,22 @@ impl Results<'_> {
             ("weft_gap_mm", "gap of the weft, mm"),
         ];
         for (column, name) in maps {
-            let points: Vec<[f64; 3]> = x.iter().zip(&y).zip(of(column)).map(|((x, y), v)| [*x, *y, v]).collect();
-            if let Some(svg) = chart::map(name, &points) {
-                page.figure(name, &svg, &format!("{} crossings at t = {} s", points.len(), last));
+            let values = table.numbers(column);
+            let range = if pulled { middle(chosen.iter().flat_map(|time| at(&times, time, &values))) } else { None };
+            for time in &chosen {
+                let points: Vec<[f64; 3]> = at(&times, time, &x)
+                    .zip(at(&times, time, &y))
+                    .zip(at(&times, time, &values))
+                    .map(|((x, y), v)| [x, y, v])
+                    .collect();
+                let shown = points.iter().filter(|p| p.iter().all(|v| v.is_finite())).count();
+                let mut caption = format!("{shown} crossings at t = {} s", short(time));
+                if pulled {
+                    caption += &format!(", d = {:.2} mm; colours as in the other maps of this size", place(time));
+                }
+                if let Some(svg) = chart::map(name, &points, range) {
+                    page.figure(name, &svg, &caption);
+                }
             }
         }
         page.raw("</div>");
@@ -336,16 +423,15 @@ impl Results<'_> {
         let phases = self.history.texts("phase");
         let rows: Vec<usize> = (0..phases.len()).filter(|r| axis.phase.is_none_or(|p| p == phases[*r])).collect();
         let Some(last) = rows.len().checked_sub(1) else { return };
-        let force = if axis.column == OVER_ANGLE.column { "f_nor_n_per_mm" } else { "force_n" };
-        let columns = [
-            axis.column,
-            force,
-            "e_internal_mj",
-            "e_kinetic_mj",
-            "e_balance_error",
-            "max_penetration_mm",
-            "min_jacobian",
-        ];
+        let loading: &[&str] = if self.is_specimen() {
+            &["displacement_mm", "force_n", "shear_angle_deg", "f_nor_n_per_mm"]
+        } else if axis.column == OVER_ANGLE.column {
+            &[OVER_ANGLE.column, "f_nor_n_per_mm"]
+        } else {
+            &[axis.column, "force_n"]
+        };
+        let state = ["e_internal_mj", "e_kinetic_mj", "e_balance_error", "max_penetration_mm", "min_jacobian"];
+        let columns = [loading, &state].concat();
         let cells: Vec<Vec<&str>> = columns.iter().map(|c| self.history.texts(c)).collect();
         let count = ROWS.min(rows.len());
         let chosen = (1..=count).map(|k| rows[(last * k) / count]);
@@ -372,6 +458,20 @@ impl Results<'_> {
             page.details("Time by stage", &stages.iter().map(stage).collect::<Vec<_>>().join("\n"));
         }
     }
+}
+
+/// Values of the rows at a time.
+fn at<'a>(times: &'a [&str], time: &'a str, values: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+    values.iter().zip(times).filter(move |(_, t)| **t == time).map(|(v, _)| *v)
+}
+
+/// Range of values without the outermost at both ends; `None` if there is none.
+fn middle(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    let outer = (OUTER * last as f64) as usize;
+    Some([values[outer], values[last - outer]])
 }
 
 /// A number of a table with five digits.

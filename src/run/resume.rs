@@ -87,6 +87,9 @@ impl Run<'_> {
         if let Some(crossings) = &mut self.crossings {
             crossings.maps.record(record);
         }
+        if let Some(pulled) = &mut self.pulled {
+            pulled.record(record);
+        }
         self.curve.record(record);
         self.last_shear.record(record);
         self.settled.record(record);
@@ -100,9 +103,15 @@ impl Run<'_> {
     }
 
     fn tables(&mut self) -> Vec<&mut Table> {
-        let tables = [&mut self.history, &mut self.energies, &mut self.stress, &mut self.contacts];
+        let tables = [&mut self.history, &mut self.energies, &mut self.contacts];
         let crossings = self.crossings.iter_mut().flat_map(|c| &mut c.tables);
-        tables.into_iter().chain(self.yarns.iter_mut().flatten()).chain(&mut self.stitches).chain(crossings).collect()
+        tables
+            .into_iter()
+            .chain(&mut self.stress)
+            .chain(self.yarns.iter_mut().flatten())
+            .chain(&mut self.stitches)
+            .chain(crossings)
+            .collect()
     }
 
     /// Begins where `start` says: the simulation is there already, tables and frames follow.
@@ -112,6 +121,10 @@ impl Run<'_> {
             Start::From(phases) => {
                 self.place.phase = phases;
                 self.last_shear = [self.simulation.load().angle, self.simulation.energies().external];
+                let displacement = self.simulation.load().motion * self.reach;
+                if let Some(pulled) = &mut self.pulled {
+                    pulled.start(&self.simulation, displacement);
+                }
                 let sheared = |step: &Step| matches!(step, Step::Shear { .. } | Step::Move { .. });
                 if !self.loaded.case.steps[..phases].iter().any(sheared) {
                     self.settle()?;

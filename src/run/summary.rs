@@ -1,11 +1,17 @@
 //! What a run says at its end: `summary.json` for programs, ten lines for a person.
 
 use super::Run;
+use super::pulled::Pulled;
 use crate::error::Result;
 use crate::measure::stitches;
 use crate::output::file;
 use serde_json::json;
 use std::fmt::Write as _;
+
+/// Part of the name of the fabric whose sizes were measured by tomography; warp and weft, width, thickness and gap, mm.
+pub(super) const PX35: &str = "PX35";
+pub(super) const TOMOGRAPHY: [[&str; 3]; 2] =
+    [["4.59 ± 0.13", "0.38 ± 0.06", "0.39 ± 0.10"], ["2.08 ± 0.08", "0.38 ± 0.04", "0.40 ± 0.04"]];
 
 impl Run<'_> {
     /// Writes `summary.json`.
@@ -44,6 +50,7 @@ impl Run<'_> {
             },
             "worst_energy_balance": self.worst_balance,
             "worst_kinetic_over_internal_in_shear": self.worst_kinetic,
+            "specimen": self.pulled.as_ref().map(Pulled::summary),
             "energies_mj": e.columns().into_iter().map(|(name, value)| (name.to_owned(), json!(value))).collect::<serde_json::Map<_, _>>(),
             "state_hash": hash,
             "pictures": self.pictures,
@@ -78,13 +85,10 @@ impl Run<'_> {
             self.dt_range[1],
             s.searches()
         );
-        let targets =
-            [("warp", "4.59 ± 0.13 / 0.38 ± 0.06 / 0.39 ± 0.10"), ("weft", "2.08 ± 0.08 / 0.38 ± 0.04 / 0.40 ± 0.04")];
-        for ((name, target), [width, thickness, gap]) in targets.into_iter().zip(self.settled.into_iter().flatten()) {
-            let _ = writeln!(
-                t,
-                "{name}       width / thickness / gap {width:.2} / {thickness:.2} / {gap:.2} mm before shear (PX35 tomography {target})"
-            );
+        if let Some(pulled) = &self.pulled {
+            t.push_str(&pulled.lines());
+        } else {
+            self.sizes(&mut t);
         }
         if let Ok(tension) = stitches::measure(&s.mesh, &s.tensions())
             && !s.mesh.threads.is_empty()
@@ -110,11 +114,12 @@ impl Run<'_> {
         }
         let _ = writeln!(
             t,
-            "energy     internal {:.3} mJ, friction {:.3} mJ; balance within {:.2} %; kinetic under {:.2} % of internal in shear",
+            "energy     internal {:.3} mJ, friction {:.3} mJ; balance within {:.2} %; kinetic under {:.2} % of internal {}",
             e.internal(),
             e.friction,
             100.0 * self.worst_balance,
-            100.0 * self.worst_kinetic
+            100.0 * self.worst_kinetic,
+            if self.pulled.is_some() { "while pulled" } else { "in shear" }
         );
         let _ = writeln!(
             t,
@@ -130,5 +135,19 @@ impl Run<'_> {
             .map_or(String::new(), |p| format!("; picture {}", self.options.output.join(p).display()));
         let _ = write!(t, "results    {}{picture}", self.options.output.display());
         t
+    }
+
+    /// Sizes of yarns before shear, beside those of the real fabric where they are known.
+    fn sizes(&self, t: &mut String) {
+        let known = self.loaded.fabric.as_ref().is_some_and(|fabric| fabric.name.contains(PX35));
+        let plies = ["warp", "weft"].into_iter().zip(TOMOGRAPHY);
+        for ((name, target), [width, thickness, gap]) in plies.zip(self.settled.into_iter().flatten()) {
+            let target = if known { format!(" (PX35 tomography {})", target.join(" / ")) } else { String::new() };
+            // writing to a String does not fail
+            let _ = writeln!(
+                t,
+                "{name}       width / thickness / gap {width:.2} / {thickness:.2} / {gap:.2} mm before shear{target}"
+            );
+        }
     }
 }

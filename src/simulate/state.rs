@@ -51,7 +51,13 @@ impl Simulation {
         self.backend.set_scalars(self.model.buffers.remainder, &rest);
     }
 
-    /// Sum of the forces that the scene exerts on its prescribed components, N.
+    /// Nodes with prescribed components.
+    pub fn prescribed_nodes(&self) -> Vec<usize> {
+        let Some(buffer) = self.model.buffers.prescribed else { return Vec::new() };
+        self.backend.uints(buffer).chunks_exact(2).map(|condition| condition[0] as usize).collect()
+    }
+
+    /// Force that the scene exerts on the prescribed components of each of those nodes, N, in the last step.
     pub fn reactions(&self) -> Vec<[f64; 3]> {
         self.model
             .buffers
