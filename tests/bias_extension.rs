@@ -147,7 +147,7 @@ fn tables_of_a_specimen_hold_force_zones_and_theory() {
     near("displacement at the end, mm", d[d.len() - 1], 1.0, 1e-6);
     let way = |i: usize| d[i] - if i == 2 * ROWS { 0.0 } else { d[i - 1] };
     let done: f64 = (2 * ROWS..d.len()).map(|i| force[i] * way(i)).sum();
-    near("∫ F dd, mJ", done, work[work.len() - 1] - work[2 * ROWS - 2], 1e-9);
+    near("∫ F dd, mJ", done, work[work.len() - 1] - work[2 * ROWS - 1], 1e-9);
     assert!(done > 0.0 && force[..2 * ROWS].iter().all(|f| f.is_finite()));
 
     // angles: the history's is that of zone C, the theory's is Eq. 18, and F_nor follows from both by Eq. 19
@@ -212,7 +212,7 @@ fn tables_of_a_specimen_hold_force_zones_and_theory() {
 
 #[cfg(unix)]
 #[test]
-fn the_curve_survives_a_kill() {
+fn the_curve_survives_a_kill_and_a_study_starts_before_it() {
     let folder = tempfile::tempdir().unwrap();
     let run = |output: &str, more: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tricot"));
@@ -237,6 +237,11 @@ fn the_curve_survives_a_kill() {
         let [a, b] = [&whole, &killed].map(|dir| fs::read_to_string(dir.join(table)).unwrap());
         assert!(a == b, "{table} differs");
     }
-    let [a, b] = [whole, killed].map(|dir| summary(&dir));
-    assert_eq!((&a["specimen"], &a["state_hash"]), (&b["specimen"], &b["state_hash"]));
+    let states = fs::read_dir(whole.join("state")).unwrap().map(|f| f.unwrap().path());
+    let hold = states.into_iter().find(|p| p.to_str().unwrap().ends_with("-2-hold.state")).unwrap();
+    assert!(run("again", &["--from", hold.to_str().unwrap()]).status().unwrap().success());
+    let [a, b, c] = [whole, killed, folder.path().join("again")].map(|dir| summary(&dir));
+    for other in [b, c] {
+        assert_eq!((&a["specimen"], &a["state_hash"]), (&other["specimen"], &other["state_hash"]));
+    }
 }

@@ -9,7 +9,7 @@ use crate::simulate::Simulation;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
-/// Way of the clamp, mm, below which a row has no mean force: it is part of the next row then.
+/// Way of the clamp over a row, mm, that counts as none: the last time step of a load step may reach into the next one.
 const STILL: f64 = 1e-5;
 /// Share of its length by which a specimen is pulled before its kinetic energy is judged: 5 mm of 240 mm.
 const SETTLED: f64 = 5.0 / 240.0;
@@ -45,6 +45,13 @@ struct Reading {
 impl Default for Reading {
     fn default() -> Self {
         Self { angle: [f64::NAN; 3], slip: f64::NAN, width: [f64::NAN; 2], gap: [f64::NAN; 2] }
+    }
+}
+
+impl Reading {
+    fn of(zones: Option<Means>) -> Self {
+        let read = |m: Means| Self { angle: m.angle, slip: m.slip[2], width: m.width, gap: m.gap };
+        zones.map_or_else(Self::default, read)
     }
 }
 
@@ -98,8 +105,9 @@ impl Pulled {
     }
 
     /// Goes on from a state that another run left.
-    pub(super) fn start(&mut self, simulation: &Simulation, displacement: f64) {
-        self.last = [displacement, simulation.energies().prescribed];
+    pub(super) fn start(&mut self, simulation: &Simulation, displacement: f64, zones: Option<Means>) {
+        self.before = Reading::of(zones);
+        self.last = [if displacement > STILL { displacement } else { 0.0 }, simulation.energies().prescribed];
     }
 
     /// A row; `pulls` in the load steps in which the clamp moves.
@@ -110,9 +118,7 @@ impl Pulled {
         let work = simulation.energies().prescribed;
         let [from, done] = self.last;
         let way = displacement - from;
-        if way == 0.0 || way.abs() > STILL {
-            self.last = [displacement, work];
-        }
+        self.last = [if way.abs() > STILL { displacement } else { from }, work];
         let force = if way.abs() > STILL {
             (work - done) / way
         } else {
@@ -120,12 +126,7 @@ impl Pulled {
             let moved = reactions.iter().zip(&self.moves).filter(|(_, moves)| **moves);
             -moved.map(|(force, _)| force[0]).sum::<f64>()
         };
-        self.now = zones.map_or_else(Reading::default, |m| Reading {
-            angle: m.angle,
-            slip: m.slip[2],
-            width: m.width,
-            gap: m.gap,
-        });
+        self.now = Reading::of(zones);
         let angle = self.now.angle[2];
         let mut normalised = f64::NAN;
         if pulls {

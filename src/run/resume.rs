@@ -122,8 +122,12 @@ impl Run<'_> {
                 self.place.phase = phases;
                 self.last_shear = [self.simulation.load().angle, self.simulation.energies().external];
                 let displacement = self.simulation.load().motion * self.reach;
-                if let Some(pulled) = &mut self.pulled {
-                    pulled.start(&self.simulation, displacement);
+                if self.pulled.is_some() {
+                    let (_, crossings) = self.see()?;
+                    let zones = self.crossings.as_ref().and_then(|c| c.means(&crossings));
+                    if let Some(pulled) = &mut self.pulled {
+                        pulled.start(&self.simulation, displacement, zones);
+                    }
                 }
                 let sheared = |step: &Step| matches!(step, Step::Shear { .. } | Step::Move { .. });
                 if !self.loaded.case.steps[..phases].iter().any(sheared) {

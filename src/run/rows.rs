@@ -72,7 +72,7 @@ impl Run<'_> {
     }
 
     /// Yarns and their crossings, if the scene has both plies.
-    fn see(&self) -> Result<(Vec<Yarn>, Vec<Crossing>)> {
+    pub(super) fn see(&self) -> Result<(Vec<Yarn>, Vec<Crossing>)> {
         if self.yarns.is_none() {
             return Ok((Vec::new(), Vec::new()));
         }
