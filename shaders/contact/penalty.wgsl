@@ -82,6 +82,10 @@ fn add_virial(item: u32, push: vec3<f32>, apart: vec3<f32>) {
 @group(1) @binding(13) var<storage, read_write> stiffness: array<atomic<i32>>;
 @group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
 
+// A surface node that is first seen deeper than this inside an open yarn came in through its end, mm: from the front, contact
+// begins at the depth of one step.
+const ENTRY: f32 = 0.01;
+
 // A slave, and the faces of one body that push it: their normal forces, and what friction needs of the first one.
 struct Touch {
     item: u32,
@@ -90,6 +94,7 @@ struct Touch {
     stiff: f32,
     full_radius: f32,
     radius: f32,
+    deepest: f32,
     elapsed: f32,
     push: vec3<f32>,
     normal_force: f32,
@@ -113,7 +118,7 @@ fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
         return;
     }
     let depth = (*all).radius - side.distance;
-    if depth <= 0.0 || -side.distance >= params.depth {
+    if depth <= 0.0 || -side.distance >= (*all).deepest {
         return;
     }
     let weights = weights(point);
@@ -198,6 +203,8 @@ fn penalty(
         keys[k + 1u] = u32(found.place.ring);
         keys[k + 2u] = u32(found.place.slice);
         let elastic = vec3<f32>(states[s], states[s + 1u], states[s + 2u]);
+        let entered = !all.is_thread && !is_closed(candidate.body) && states[s + 3u] <= 0.0;
+        all.deepest = select(params.depth, ENTRY, entered);
         all.push = vec3<f32>(0.0);
         all.normal_force = 0.0;
         all.touched = false;

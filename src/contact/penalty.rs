@@ -47,6 +47,10 @@ const FORCE: usize = 12;
 const STIFFNESS: usize = 13;
 const STATUS: usize = 14;
 
+/// A surface node that is first seen deeper than this inside an open yarn came in through its end, mm: from the front, contact
+/// begins at the depth of one step.
+const ENTRY: f64 = 0.01;
+
 /// Contact forces of slave nodes.
 pub struct Penalty;
 
@@ -143,6 +147,8 @@ impl Kernel for Penalty {
                 (at[1], at[2]) = (place.ring as u32, place.slice as u32);
                 let elastic = [state[0], state[1], state[2]];
                 let tangential = penalty * real(params.tangential);
+                let entered = !is_thread && surface.bodies[body].closed == 0 && state[3] <= zero;
+                let deepest = if entered { constant(ENTRY) } else { real(params.depth) };
                 let (near, single);
                 let faces = if is_thread && point.distance < radius {
                     near = surface.faces_within(slave, body, image, place, (corners, point), radius);
@@ -158,7 +164,7 @@ impl Kernel for Penalty {
                 for (corners, point) in faces {
                     let Some((normal, distance)) = point.normal_and_distance(is_thread) else { continue };
                     let depth = radius - distance;
-                    if depth <= zero || -distance >= real(params.depth) {
+                    if depth <= zero || -distance >= deepest {
                         continue;
                     }
                     let weights = point.weights();
