@@ -49,7 +49,13 @@ fn cell() -> Value {
 /// A small specimen with threads held at its cuts, tightened fast.
 fn specimen() -> Value {
     let domain = json!({ "specimen": { "length_mm": 20, "width_mm": 14, "displacement_mm": 0.01 } });
-    with(cell(), &[("/domain", domain), ("/steps/1", json!({ "move": { "time_s": 1e-4 } }))])
+    with(
+        cell(),
+        &[
+            ("/domain", domain),
+            ("/steps", json!([{ "pretension": { "time_s": 1.5e-4 } }, { "move": { "time_s": 1e-4 } }])),
+        ],
+    )
 }
 
 /// Two blocks of different laws that touch, one held, with a loose thread, gravity and open fibre lines.

@@ -32,7 +32,7 @@ fn scenes() -> Vec<(&'static str, Value)> {
         cell.clone(),
         &[
             ("/domain", json!({ "specimen": { "length_mm": 20, "width_mm": 14, "displacement_mm": 0.01 } })),
-            ("/steps/1", json!({ "move": { "time_s": 1e-4 } })),
+            ("/steps", json!([{ "pretension": { "time_s": 1.5e-4 } }, { "move": { "time_s": 1e-4 } }])),
         ],
     );
     let held = json!({ "within": [[-0.1, -0.1, -0.1], [0.1, 1.1, 1.1]], "displacement_mm": [0, 0, 0] });

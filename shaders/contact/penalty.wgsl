@@ -82,9 +82,11 @@ fn add_virial(item: u32, push: vec3<f32>, apart: vec3<f32>) {
 @group(1) @binding(13) var<storage, read_write> stiffness: array<atomic<i32>>;
 @group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
 
-// A surface node that is first seen deeper than this inside an open yarn came in through its end, mm: from the front, contact
-// begins at the depth of one step.
-const ENTRY: f32 = 0.01;
+// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: a surface node that is
+// first seen deeper inside an open yarn came in through its end, and no side pushes it out.
+const ENTRY: f32 = 1e-3;
+// Force that stands for a touch without pressure, N.
+const TOUCH: f32 = 1e-30;
 
 // A slave, and the faces of one body that push it: their normal forces, and what friction needs of the first one.
 struct Touch {
@@ -94,7 +96,7 @@ struct Touch {
     stiff: f32,
     full_radius: f32,
     radius: f32,
-    deepest: f32,
+    enters: bool,
     elapsed: f32,
     push: vec3<f32>,
     normal_force: f32,
@@ -118,7 +120,7 @@ fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
         return;
     }
     let depth = (*all).radius - side.distance;
-    if depth <= 0.0 || -side.distance >= (*all).deepest {
+    if depth <= 0.0 || -side.distance >= params.depth {
         return;
     }
     let weights = weights(point);
@@ -135,6 +137,9 @@ fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
     apart = corners.reference[3] * -weights[3] + apart;
     motion = motion + apply(rate(), apart);
     let approach = dot(motion, side.normal);
+    if (*all).enters && depth > ENTRY - 2.0 * min(approach, 0.0) * (*all).elapsed {
+        return;
+    }
     let pressed = press((*all).stiff, depth, inverse_mass, approach);
     let item = (*all).item;
     add_sum(item, SUM_DAMPING, (pressed.elastic_force - pressed.pressing) * approach * (*all).elapsed);
@@ -203,8 +208,8 @@ fn penalty(
         keys[k + 1u] = u32(found.place.ring);
         keys[k + 2u] = u32(found.place.slice);
         let elastic = vec3<f32>(states[s], states[s + 1u], states[s + 2u]);
-        let entered = !all.is_thread && !is_closed(candidate.body) && states[s + 3u] <= 0.0;
-        all.deepest = select(params.depth, ENTRY, entered);
+        let open = !all.is_thread && !is_closed(candidate.body);
+        all.enters = open && states[s + 3u] <= 0.0;
         all.push = vec3<f32>(0.0);
         all.normal_force = 0.0;
         all.touched = false;
@@ -220,7 +225,7 @@ fn penalty(
             states[s] = 0.0;
             states[s + 1u] = 0.0;
             states[s + 2u] = 0.0;
-            states[s + 3u] = -max(gap, 0.0);
+            states[s + 3u] = select(-max(gap, 0.0), TOUCH, open && all.touched);
             continue;
         }
         touches = true;

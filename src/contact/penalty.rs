@@ -47,9 +47,11 @@ const FORCE: usize = 12;
 const STIFFNESS: usize = 13;
 const STATUS: usize = 14;
 
-/// A surface node that is first seen deeper than this inside an open yarn came in through its end, mm: from the front, contact
-/// begins at the depth of one step.
-const ENTRY: f64 = 0.01;
+/// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: a surface node that is
+/// first seen deeper inside an open yarn came in through its end, and no side pushes it out.
+const ENTRY: f64 = 1e-3;
+/// Force that stands for a touch without pressure, N.
+const TOUCH: f64 = 1e-30;
 
 /// Contact forces of slave nodes.
 pub struct Penalty;
@@ -147,8 +149,8 @@ impl Kernel for Penalty {
                 (at[1], at[2]) = (place.ring as u32, place.slice as u32);
                 let elastic = [state[0], state[1], state[2]];
                 let tangential = penalty * real(params.tangential);
-                let entered = !is_thread && surface.bodies[body].closed == 0 && state[3] <= zero;
-                let deepest = if entered { constant(ENTRY) } else { real(params.depth) };
+                let open = !is_thread && surface.bodies[body].closed == 0;
+                let enters = open && state[3] <= zero;
                 let (near, single);
                 let faces = if is_thread && point.distance < radius {
                     near = surface.faces_within(slave, body, image, place, (corners, point), radius);
@@ -164,7 +166,7 @@ impl Kernel for Penalty {
                 for (corners, point) in faces {
                     let Some((normal, distance)) = point.normal_and_distance(is_thread) else { continue };
                     let depth = radius - distance;
-                    if depth <= zero || -distance >= deepest {
+                    if depth <= zero || -distance >= real(params.depth) {
                         continue;
                     }
                     let weights = point.weights();
@@ -178,6 +180,9 @@ impl Kernel for Penalty {
                     }
                     let motion = add(motion, apply(&io.row.rate, apart));
                     let approach = dot(motion, normal);
+                    if enters && depth > constant(ENTRY) - constant(2.0) * approach.min(zero) * elapsed {
+                        continue;
+                    }
                     let Press { elastic_force, pressing, row_sum } =
                         press(&params, io.row, penalty, depth, inverse, approach);
                     sum[SUM_DAMPING] = sum[SUM_DAMPING] + (elastic_force - pressing) * approach * elapsed;
@@ -200,7 +205,8 @@ impl Kernel for Penalty {
                     sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
                     // a point behind a face keeps being looked at
                     let gap = if is_thread || point.height() > zero { point.distance - radius } else { zero };
-                    state.copy_from_slice(&[zero, zero, zero, -gap.max(zero)]);
+                    let left = if open && first.is_some() { constant(TOUCH) } else { -gap.max(zero) };
+                    state.copy_from_slice(&[zero, zero, zero, left]);
                     continue;
                 };
                 touches = true;
