@@ -41,18 +41,14 @@ impl Ties {
         if specimen.thread_ends == ThreadEnds::Free {
             return Self::default();
         }
-        let clamped = specimen::clamped(specimen, mesh).concat();
+        let mut clamped = specimen::clamped(specimen, mesh).concat();
+        clamped.sort_unstable();
         let mut held = BTreeMap::new();
         for thread in &mesh.threads {
-            let last = thread.first + thread.count - 1;
-            for (end, run) in
-                [(thread.first, (thread.first..=last).collect()), (last, (thread.first..=last).rev().collect())]
-            {
-                if clamped.binary_search(&end).is_ok() {
-                    continue;
-                }
-                let run: Vec<usize> = run;
-                hold(mesh, thread.radius, &within(mesh, &run), &mut held);
+            let forth: Vec<usize> = (thread.first..thread.first + thread.count).collect();
+            let back: Vec<usize> = forth.iter().rev().copied().collect();
+            for run in [forth, back].iter().filter(|run| clamped.binary_search(&run[0]).is_err()) {
+                hold(mesh, thread.radius, &within(mesh, run), &mut held);
             }
         }
         for (thread, apex) in linking::open_heads(mesh) {
