@@ -9,7 +9,6 @@ use crate::measure::shear::trellis;
 #[derive(Debug, Clone)]
 pub struct Schedule {
     phases: Vec<Phase>,
-    damping: [f64; 2],
     initial_radius: f64,
 }
 
@@ -22,8 +21,8 @@ pub struct Phase {
     pub end: f64,
     from: Load,
     to: Load,
-    /// Threads are damped as they settle.
-    settles: bool,
+    /// Damping rates of solids and of threads, 1/s.
+    damping: [f64; 2],
 }
 
 /// What is prescribed at one moment.
@@ -75,12 +74,15 @@ impl Schedule {
                 Step::Move { .. } => Load { motion: 1.0, ..load },
             };
             let end = start + step.time();
-            let settles = matches!(step, Step::Settle { .. } | Step::Pretension { .. });
-            phases.push(Phase { name: step.name(), start, end, from: load, to, settles });
+            let damping = effects.damping.as_ref().map_or([0.0; 2], |d| match step {
+                Step::Settle { .. } | Step::Pretension { .. } => [d.rate_per_s, d.thread_settle_rate_per_s],
+                Step::Hold { .. } | Step::Shear { .. } => [d.rate_per_s; 2],
+                Step::Move { .. } => [d.move_rate_per_s.unwrap_or(d.rate_per_s); 2],
+            });
+            phases.push(Phase { name: step.name(), start, end, from: load, to, damping });
             (load, start) = (to, end);
         }
-        let damping = effects.damping.as_ref().map_or([0.0; 2], |d| [d.rate_per_s, d.thread_settle_rate_per_s]);
-        Self { phases, damping, initial_radius: radius.min(initial_radius) }
+        Self { phases, initial_radius: radius.min(initial_radius) }
     }
 
     pub fn phases(&self) -> &[Phase] {
@@ -130,9 +132,9 @@ impl Schedule {
         row.radius = now.radius;
         row.radius_increment = now.radius - last.radius;
         row.motion = (next.motion - now.motion) / dt;
-        let settles = self.phases.get(self.phase_at(time)).is_some_and(|p| p.settles);
-        row.damping_solid = self.damping[0];
-        row.damping_thread = if settles { self.damping[1] } else { self.damping[0] };
+        if let Some(phase) = self.phases.get(self.phase_at(time)) {
+            [row.damping_solid, row.damping_thread] = phase.damping;
+        }
         row
     }
 }
@@ -140,6 +142,20 @@ impl Schedule {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::case::effects::Damping;
+
+    #[test]
+    fn every_load_step_has_its_damping() {
+        let damping = Damping { rate_per_s: 3.0, thread_settle_rate_per_s: 5.0, move_rate_per_s: Some(2.0) };
+        let effects = Effects { damping: Some(damping), ..Effects::default() };
+        let steps = [Step::Pretension { time_s: 1.0 }, Step::Hold { time_s: 1.0 }, Step::Move { time_s: 1.0 }];
+        let schedule = Schedule::new(&steps, &effects);
+        let rates = |time: f64| {
+            let row = schedule.row(time, 1e-3, 1e-3);
+            [row.damping_solid, row.damping_thread]
+        };
+        assert_eq!([0.5, 1.5, 2.5].map(rates), [[3.0, 5.0], [3.0, 3.0], [2.0, 2.0]]);
+    }
 
     #[test]
     fn amplitudes_are_smooth_and_reach_their_ends() {

@@ -283,6 +283,29 @@ fn a_thread_passes_an_edge_smoothly() {
     }
 }
 
+/// Yarns are open at their ends: what slides in there is inside without having passed a side, and no side pushes it out.
+#[test]
+fn what_enters_through_an_open_end_is_not_pushed_out() {
+    let yarn = block("yarn", [8, 2, 1], [[0.0, 0.0, 0.0], [2.0, 1.0, 0.4]], 1e-9, neo_hookean(10.0, 0.3));
+    let slider = block("slider", [4, 2, 1], [[-1.2, 0.2, 0.32], [-0.2, 0.8, 0.72]], 1e-9, neo_hookean(10.0, 0.3));
+    let whole =
+        |body: &str, x: f64| json!({ "within": [[-9, -9, -9], [9, 9, 9]], "body": body, "displacement_mm": [x, 0, 0] });
+    let case = with(
+        scene(json!([yarn, slider]), json!({})),
+        &[
+            ("/domain/mesh/conditions", json!([whole("yarn", 0.0), whole("slider", 0.7)])),
+            ("/steps", json!([{ "move": { "time_s": 2e-4 } }])),
+            ("/integration", json!({ "dt_max_s": 2e-7 })),
+        ],
+    );
+    let mut simulation = start(&case, F64);
+    advance(&mut simulation, 2e-4);
+    let tip = positions(&simulation).iter().map(|x| x[0]).fold(f64::NEG_INFINITY, f64::max);
+    assert!(tip == 2.0 && simulation.health().touching == [0; 3], "{:?}", simulation.health());
+    assert_eq!(simulation.energies().contact, 0.0);
+    assert!(field(&simulation, "contact_force_n").iter().all(|f| *f == 0.0));
+}
+
 #[test]
 fn the_search_finds_what_brute_force_finds() {
     let (radius, penalty) = (0.12, 100.0);

@@ -46,6 +46,18 @@ fn cell() -> Value {
     })
 }
 
+/// A small specimen with threads held at its cuts, tightened fast.
+fn specimen() -> Value {
+    let domain = json!({ "specimen": { "length_mm": 20, "width_mm": 14, "displacement_mm": 0.01 } });
+    with(
+        cell(),
+        &[
+            ("/domain", domain),
+            ("/steps", json!([{ "pretension": { "time_s": 1.5e-4 } }, { "move": { "time_s": 1e-4 } }])),
+        ],
+    )
+}
+
 /// Two blocks of different laws that touch, one held, with a loose thread, gravity and open fibre lines.
 fn free() -> Value {
     let held = json!({ "within": [[-0.1, -0.1, -0.1], [0.1, 1.1, 1.1]], "displacement_mm": [0.01, 0, 0] });
@@ -171,8 +183,8 @@ fn every_stage_agrees_with_the_cpu_on_every_buffer() {
     println!("{:?}", device.listed());
     let mut found = BTreeMap::new();
     let make = || Make { threads: 1, ..Make::default() };
-    for case in [cell(), free()] {
-        let end = 2.5e-4f64.min(if case["domain"].get("cell").is_some() { 1.0 } else { 1e-4 });
+    for case in [cell(), specimen(), free()] {
+        let end = 2.5e-4f64.min(if case["domain"].get("mesh").is_none() { 1.0 } else { 1e-4 });
         let mut simulation = run::simulation(&loaded(&case), make()).unwrap();
         // a state in mid-run, then random ones
         advance(&mut simulation, end);

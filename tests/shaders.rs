@@ -28,6 +28,13 @@ fn scenes() -> Vec<(&'static str, Value)> {
         "steps": [{ "pretension": { "time_s": 1.5e-4 } }, { "shear": { "angle_deg": 3, "time_s": 1e-4 } }],
         "effects": {}
     });
+    let specimen = with(
+        cell.clone(),
+        &[
+            ("/domain", json!({ "specimen": { "length_mm": 20, "width_mm": 14, "displacement_mm": 0.01 } })),
+            ("/steps", json!([{ "pretension": { "time_s": 1.5e-4 } }, { "move": { "time_s": 1e-4 } }])),
+        ],
+    );
     let held = json!({ "within": [[-0.1, -0.1, -0.1], [0.1, 1.1, 1.1]], "displacement_mm": [0, 0, 0] });
     let thread = json!({
         "name": "thread", "nodes": [[0, 0, 2], [1, 0, 2], [2, 0.2, 2], [3, 0, 2]], "radius_mm": 0.1,
@@ -54,6 +61,7 @@ fn scenes() -> Vec<(&'static str, Value)> {
     vec![
         ("cell", cell),
         ("cell without contact mass", without_mass),
+        ("specimen", specimen),
         ("free", free),
         ("free with lines and contact", lines),
         ("without gravity", falling),
@@ -92,7 +100,7 @@ macro_rules! fields {
 fn parameters(file: &str) -> Vec<Field<&'static str>> {
     match file {
         "elements/hex8" => fields!(elements::hex8::Params: nodes),
-        "contact/grid" | "contact/candidates" | "contact/penalty" | "contact/threads" => fields!(
+        "contact/grid" | "contact/candidates" | "contact/penalty" | "contact/threads" | "contact/tie" => fields!(
             contact::Params: period, cells, capacity, slots, beam_slots, slabs, origin, cell, skin, friction, tangential, damping,
             force_quantum, stiffness_quantum, thread_radius, thread_thread, self_arc, depth
         ),
@@ -196,6 +204,6 @@ fn every_twin_compiles_and_sees_what_its_stage_binds() {
         failed += usize::from(catch_unwind(|| check(&name, &stage, &buffers)).is_err());
     }
     println!("{seen:#?}");
-    assert!(seen.len() == 24, "{} kinds of stages", seen.len());
+    assert!(seen.len() == 25, "{} kinds of stages", seen.len());
     assert_eq!(failed, 0, "stages without a twin that fits; see above");
 }

@@ -81,6 +81,12 @@ fn add_virial(item: u32, push: vec3<f32>, apart: vec3<f32>) {
 @group(1) @binding(13) var<storage, read_write> stiffness: array<atomic<i32>>;
 @group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
 
+// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: a surface node that is
+// first seen deeper inside an open yarn came in through its end, and no side pushes it out.
+const ENTRY: f32 = 1e-3;
+// Force that stands for a touch without pressure, N.
+const TOUCH: f32 = 1e-30;
+
 // A slave, and the faces of one body that push it: their normal forces, and what friction needs of the first one.
 struct Touch {
     item: u32,
@@ -89,6 +95,7 @@ struct Touch {
     stiff: f32,
     full_radius: f32,
     radius: f32,
+    enters: bool,
     elapsed: f32,
     push: vec3<f32>,
     normal_force: f32,
@@ -129,6 +136,9 @@ fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
     apart = corners.reference[3] * -weights[3] + apart;
     motion = motion + apply(rate(), apart);
     let approach = dot(motion, side.normal);
+    if (*all).enters && depth > ENTRY - 2.0 * min(approach, 0.0) * (*all).elapsed {
+        return;
+    }
     let pressed = press((*all).stiff, depth, inverse_mass, approach);
     let item = (*all).item;
     add_sum(item, SUM_DAMPING, (pressed.elastic_force - pressed.pressing) * approach * (*all).elapsed);
@@ -188,6 +198,8 @@ fn penalty(item: u32) {
         keys[k + 1u] = u32(found.place.ring);
         keys[k + 2u] = u32(found.place.slice);
         let elastic = vec3<f32>(states[s], states[s + 1u], states[s + 2u]);
+        let open = !all.is_thread && !is_closed(candidate.body);
+        all.enters = open && states[s + 3u] <= 0.0;
         all.push = vec3<f32>(0.0);
         all.normal_force = 0.0;
         all.touched = false;
@@ -203,7 +215,7 @@ fn penalty(item: u32) {
             states[s] = 0.0;
             states[s + 1u] = 0.0;
             states[s + 2u] = 0.0;
-            states[s + 3u] = -max(gap, 0.0);
+            states[s + 3u] = select(-max(gap, 0.0), TOUCH, open && all.touched);
             continue;
         }
         touches = true;

@@ -51,6 +51,8 @@ pub struct Specimen {
     pub clamp_mm: f64,
     /// Moment from which the clamps hold. Default `start`.
     pub clamps: Clamps,
+    /// What becomes of threads at cuts. Default `held`.
+    pub thread_ends: ThreadEnds,
     /// Displacement of the clamp at x > 0, away from the other one, at the end of the `move` step, mm. Default 60.
     #[schemars(range(min = 0, max = 200))]
     pub displacement_mm: f64,
@@ -67,6 +69,19 @@ pub enum Clamps {
     AfterPretension,
 }
 
+/// What becomes of the stitch where it is cut: at the ends of threads outside the clamps, and at loops through which no
+/// other loop passes any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ThreadEnds {
+    /// They slide freely: as the stitch tightens, it draws in from the cuts and its loops come undone one after the other.
+    Free,
+    /// One node of each stays where it is on the yarn beside it, as do thread ends that are caught between the fibres.
+    /// Needs contact.
+    #[default]
+    Held,
+}
+
 impl Default for Specimen {
     fn default() -> Self {
         Self {
@@ -75,6 +90,7 @@ impl Default for Specimen {
             warp_angle_deg: 45.0,
             clamp_mm: 0.0,
             clamps: Clamps::Start,
+            thread_ends: ThreadEnds::Held,
             displacement_mm: 60.0,
         }
     }

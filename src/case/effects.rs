@@ -108,11 +108,15 @@ pub struct Damping {
     /// Rate for threads during pretension and settle steps, 1/s. Default 20000.
     #[schemars(range(min = 0, max = 1e7))]
     pub thread_settle_rate_per_s: f64,
+    /// Rate for every node during move steps, 1/s: there the fabric moves as a whole through the medium at rest that this
+    /// damping stands for. `null` (the default) takes `rate_per_s`.
+    #[schemars(range(min = 0, max = 1e7))]
+    pub move_rate_per_s: Option<f64>,
 }
 
 impl Default for Damping {
     fn default() -> Self {
-        Self { rate_per_s: 2000.0, thread_settle_rate_per_s: 2e4 }
+        Self { rate_per_s: 2000.0, thread_settle_rate_per_s: 2e4, move_rate_per_s: None }
     }
 }
 

@@ -12,6 +12,7 @@ pub mod grid;
 pub mod penalty;
 pub mod slip;
 pub mod threads;
+pub mod tie;
 pub mod travel;
 
 use crate::kernel::lane::Real;

@@ -47,6 +47,12 @@ const FORCE: usize = 12;
 const STIFFNESS: usize = 13;
 const STATUS: usize = 14;
 
+/// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: a surface node that is
+/// first seen deeper inside an open yarn came in through its end, and no side pushes it out.
+const ENTRY: f64 = 1e-3;
+/// Force that stands for a touch without pressure, N.
+const TOUCH: f64 = 1e-30;
+
 /// Contact forces of slave nodes.
 pub struct Penalty;
 
@@ -143,6 +149,8 @@ impl Kernel for Penalty {
                 (at[1], at[2]) = (place.ring as u32, place.slice as u32);
                 let elastic = [state[0], state[1], state[2]];
                 let tangential = penalty * real(params.tangential);
+                let open = !is_thread && surface.bodies[body].closed == 0;
+                let enters = open && state[3] <= zero;
                 let (near, single);
                 let faces = if is_thread && point.distance < radius {
                     near = surface.faces_within(slave, body, image, place, (corners, point), radius);
@@ -172,6 +180,9 @@ impl Kernel for Penalty {
                     }
                     let motion = add(motion, apply(&io.row.rate, apart));
                     let approach = dot(motion, normal);
+                    if enters && depth > constant(ENTRY) - constant(2.0) * approach.min(zero) * elapsed {
+                        continue;
+                    }
                     let Press { elastic_force, pressing, row_sum } =
                         press(&params, io.row, penalty, depth, inverse, approach);
                     sum[SUM_DAMPING] = sum[SUM_DAMPING] + (elastic_force - pressing) * approach * elapsed;
@@ -194,7 +205,8 @@ impl Kernel for Penalty {
                     sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
                     // a point behind a face keeps being looked at
                     let gap = if is_thread || point.height() > zero { point.distance - radius } else { zero };
-                    state.copy_from_slice(&[zero, zero, zero, -gap.max(zero)]);
+                    let left = if open && first.is_some() { constant(TOUCH) } else { -gap.max(zero) };
+                    state.copy_from_slice(&[zero, zero, zero, left]);
                     continue;
                 };
                 touches = true;

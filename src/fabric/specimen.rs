@@ -4,7 +4,8 @@
 //! end each fibre line is stretched or shortened until its last node lies in the cut, so that every element stays a
 //! hexahedron. At the corners, fibre lines shorter than a slice are left out, and so are yarns of which fewer than three
 //! columns remain. Threads are cut where they leave the rectangle; pieces shorter than a loop bind nothing and are left
-//! out. What lies in a clamp is held, all other ends are free.
+//! out. What lies in a clamp is held, all other ends of yarns are free. Where threads are cut, and where a loop has lost the
+//! next one, the stitch would come undone; [`crate::case::domain::ThreadEnds`] says whether it may.
 //!
 //! In the fabric the origin is the middle of a warp and of a gap between two wefts, where a course of the stitch runs.
 

@@ -29,9 +29,40 @@ impl Link {
     }
 }
 
+/// Threads and top nodes of the whole loops of an open stitch through whose heads no whole loop passes.
+pub fn open_heads(mesh: &Mesh) -> Vec<(usize, usize)> {
+    let Some(wale) = wale(mesh) else { return Vec::new() };
+    let loops = loops(mesh, wale);
+    let open = |head: &&Loop| next(mesh, wale, &loops, head).is_none();
+    loops.iter().filter(open).map(|head| (head.thread, head.first + head.apex)).collect()
+}
+
+/// Direction of wales: they run along the warps.
+fn wale(mesh: &Mesh) -> Option<Vector> {
+    mesh.blocks.iter().find(|b| b.ply == Ply::Warp).map(|b| b.fibre)
+}
+
+/// The next loop of the wale, whose legs start nearest to the apex of a head, and how far its image is away, mm.
+fn next<'a>(mesh: &Mesh, wale: Vector, loops: &'a [Loop], head: &Loop) -> Option<(&'a Loop, Vector)> {
+    let apex = head.nodes[head.apex];
+    let image = |l: &Loop| {
+        let whole = |k: usize, period: f64| ((apex[k] - l.base[k]) / period).round() * period;
+        mesh.period.map_or([0.0; 3], |[lx, ly]| [whole(0, lx), whole(1, ly), 0.0])
+    };
+    let away = |l: &Loop| {
+        let d = sub(apex, add(l.base, image(l)));
+        libm::hypot(d[0], d[1])
+    };
+    let nearest = loops.iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
+    let height = dot(sub(apex, head.base), wale);
+    (mesh.period.is_some() || away(nearest) <= 0.5 * height).then(|| (nearest, image(nearest)))
+}
+
 /// A whole loop: its nodes, from the top of the entry leg to the top of the exit leg.
 struct Loop {
     thread: usize,
+    /// First node of an open thread's loop.
+    first: usize,
     nodes: Vec<Vector>,
     /// Node furthest along the wale.
     apex: usize,
@@ -41,30 +72,16 @@ struct Loop {
 
 /// One entry per loop of a stitched fabric; where threads are cut, per whole loop whose next one is whole too.
 pub fn links(mesh: &Mesh) -> Vec<Link> {
-    // wales run along the warps
-    let Some(wale) = mesh.blocks.iter().find(|b| b.ply == Ply::Warp).map(|b| b.fibre) else { return Vec::new() };
+    let Some(wale) = wale(mesh) else { return Vec::new() };
     let loops = loops(mesh, wale);
     let name = |l: &Loop| mesh.threads[l.thread].name.clone();
     let mut links = Vec::new();
     for head in &loops {
-        // The next loop of the wale is the one whose legs start nearest to the apex, in the image where they do.
-        let apex = head.nodes[head.apex];
-        let image = |l: &Loop| {
-            let whole = |k: usize, period: f64| ((apex[k] - l.base[k]) / period).round() * period;
-            mesh.period.map_or([0.0; 3], |[lx, ly]| [whole(0, lx), whole(1, ly), 0.0])
-        };
-        let away = |l: &Loop| {
-            let d = sub(apex, add(l.base, image(l)));
-            libm::hypot(d[0], d[1])
-        };
-        let Some(next) = loops.iter().min_by(|a, b| away(a).total_cmp(&away(b))) else { continue };
-        let height = dot(sub(apex, head.base), wale);
-        if mesh.period.is_none() && away(next) > 0.5 * height {
-            continue;
-        }
+        let Some((next, image)) = next(mesh, wale, &loops, head) else { continue };
+        let height = dot(sub(head.nodes[head.apex], head.base), wale);
         let above = |p: &Vector| dot(sub(*p, head.base), wale) > 0.5 * height;
         let closed: Vec<Vector> = head.nodes.iter().copied().filter(above).collect();
-        let legs: Vec<Vector> = next.nodes.iter().map(|&p| add(p, image(next))).collect();
+        let legs: Vec<Vector> = next.nodes.iter().map(|&p| add(p, image)).collect();
         let leg = |nodes: &[Vector]| linking(&closed, &detour(nodes, scale(wale, FAR)));
         let exit: Vec<Vector> = legs[next.apex..].iter().rev().copied().collect();
         // The exit leg is walked backwards so that both start at the warp; along the thread it counts the other way.
@@ -96,7 +113,7 @@ fn loops(mesh: &Mesh, wale: Vector) -> Vec<Loop> {
             let apex = (0..nodes.len()).fold(0, |best, i| if height(i) > height(best) { i } else { best });
             let [a, b] = [nodes[0], nodes[nodes.len() - 1]];
             let base = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])];
-            loops.push(Loop { thread: index, nodes, apex, base });
+            loops.push(Loop { thread: index, first: thread.first + start, nodes, apex, base });
         }
     }
     loops

@@ -8,12 +8,13 @@ mod conditions;
 mod solids;
 mod surfaces;
 mod threads;
+mod ties;
 mod totals;
 
 use crate::case::Case;
 use crate::conditions::prescribed;
 use crate::contact::{
-    self, Params as ContactParams, candidates, grid, penalty, status, threads as thread_contact, travel,
+    self, Params as ContactParams, candidates, grid, penalty, status, threads as thread_contact, tie, travel,
 };
 use crate::dynamics::{assemble, fibre_lines, integrate, time_step};
 use crate::elements::{beam2, bend, hex8};
@@ -30,6 +31,7 @@ use conditions::Conditions;
 use solids::Solids;
 use surfaces::Surfaces;
 use threads::Threads;
+use ties::Ties;
 pub use totals::{Largest, Sums, Totals};
 
 /// A plan, and what the host must know to drive it and to understand what it computes.
@@ -284,6 +286,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
                 mesh,
                 threads: &threads,
                 conditions: &conditions,
+                ties: Ties::new(case, mesh, chosen.thread_thread_penalty_n_mm),
                 capacity,
                 reference,
                 quanta: quanta_,
@@ -441,6 +444,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         bend_virial,
         contact_sums: faces.map(|f| f.sums),
         pair_sums: pairs.map(|p| p.sums),
+        ties: contact.as_ref().and_then(|c| c.ties),
         reaction_work,
         added_mass,
     };
@@ -538,6 +542,8 @@ struct ContactParts {
     stiffness: Buffer,
     faces: Option<ContactBuffers>,
     pairs: Option<ContactBuffers>,
+    /// Energies of ties, and how many there are.
+    ties: Option<(Buffer, usize)>,
     slaves: Vec<Slave>,
 }
 
@@ -548,6 +554,7 @@ struct ContactScene<'a> {
     mesh: &'a Mesh,
     threads: &'a Threads,
     conditions: &'a Conditions,
+    ties: Ties,
     capacity: Capacity,
     reference: Buffer,
     quanta: Buffer,
@@ -643,13 +650,23 @@ impl ContactScene<'_> {
             b.plan.step.push(beside::<thread_contact::Force>("beam contact", beams, 32, &reads, &writes, params));
             ContactBuffers { sums, keys, state }
         });
+        let ties = (self.ties.count() > 0).then(|| {
+            let count = self.ties.count();
+            let nodes = b.indices("ties", self.ties.nodes.clone());
+            let values = b.table("tie values", self.ties.values.clone());
+            let energy = b.scratch("tie energies", count);
+            let reads = [nodes, values, self.quanta, self.remainder];
+            let writes = [(energy, own(1, 1)), (force, Access::Atomic), (stiffness, Access::Atomic), status];
+            b.plan.step.push(beside::<tie::Tie>("ties", count, 64, &reads, &writes, params));
+            (energy, count)
+        });
         let slaves = surfaces
             .slaves
             .chunks_exact(penalty::SLAVE)
             .zip(&surfaces.measure)
             .map(|(s, measure)| Slave { node: s[0] as usize, measure: *measure, is_thread: s[1] == contact::EMPTY })
             .collect();
-        Some(ContactParts { params, force, stiffness, faces, pairs, slaves })
+        Some(ContactParts { params, force, stiffness, faces, pairs, ties, slaves })
     }
 
     fn params(&self, surfaces: &Surfaces, slabs: usize) -> ContactParams {

@@ -56,6 +56,8 @@ pub struct Totals {
     pub stress: Vec<Sums>,
     /// Of slaves and pairs of beams: columns as in [`penalty`].
     pub contact: Vec<Sums>,
+    /// Elastic energy of ties.
+    pub ties: Option<Sums>,
     /// Strain energy of hexahedra by mode.
     pub modes: Option<Sums>,
     pub axial: Option<Sums>,
@@ -97,6 +99,8 @@ pub(super) struct Sources<'a> {
     pub bend_virial: Option<Buffer>,
     pub contact_sums: Option<Buffer>,
     pub pair_sums: Option<Buffer>,
+    /// Energies of ties, and their number.
+    pub ties: Option<(Buffer, usize)>,
     pub reaction_work: Option<Buffer>,
     pub added_mass: Option<Buffer>,
 }
@@ -267,6 +271,7 @@ pub(super) fn add(b: &mut Builder, s: &Sources) -> (Totals, Option<Buffer>) {
         reaction: s.reaction_work.map(|work| c.taken(work, Columns::range(0..s.conditions), false)),
         stress,
         contact,
+        ties: s.ties.map(|(energy, count)| c.kept(energy, Columns::range(0..count))),
         modes: s.hex_energy.map(|e| c.kept(e, Columns::blocks(s.hex_blocks, hex8::ENERGY, 4))),
         axial: s.beam_tension.map(|tension| c.axial(tension, s)),
         bending: s.bend_energy.map(|e| c.kept(e, Columns::range(0..s.bends))),

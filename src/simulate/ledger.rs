@@ -18,7 +18,7 @@ pub struct Energies {
     /// Of threads.
     pub axial: f64,
     pub bending: f64,
-    /// Elastic energy of contact, normal and tangential.
+    /// Elastic energy of contact, normal and tangential, and of ties.
     pub contact: f64,
     /// ½ Σ m v² of the unknown: the fluctuation velocity in a periodic cell.
     pub kinetic: f64,
@@ -115,7 +115,7 @@ impl Simulation {
 
     /// Adds what contact summed since the last look.
     pub(super) fn add_contact(&mut self, totals: &[f64]) {
-        self.energies.contact = 0.0;
+        self.energies.contact = self.model.totals.ties.map_or(0.0, |ties| ties.of(totals, 0));
         for sums in &self.model.totals.contact {
             self.energies.contact += sums.of(totals, penalty::SUM_ENERGY);
             self.energies.friction += sums.of(totals, penalty::SUM_FRICTION);
