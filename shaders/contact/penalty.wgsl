@@ -84,6 +84,8 @@ fn add_virial(item: u32, push: vec3<f32>, apart: vec3<f32>) {
 // From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: a surface node that is
 // first seen deeper inside an open yarn came in through its end, and no side pushes it out.
 const ENTRY: f32 = 1e-3;
+// Bound on approach from which on the scene is looked at before it moves, mm/s.
+const AT_REST: f32 = 1e20;
 // Force that stands for a touch without pressure, N.
 const TOUCH: f32 = 1e-30;
 
@@ -199,7 +201,7 @@ fn penalty(item: u32) {
         keys[k + 2u] = u32(found.place.slice);
         let elastic = vec3<f32>(states[s], states[s + 1u], states[s + 2u]);
         let open = !all.is_thread && !is_closed(candidate.body);
-        all.enters = open && states[s + 3u] <= 0.0;
+        all.enters = open && states[s + 3u] <= 0.0 && row.approach < AT_REST;
         all.push = vec3<f32>(0.0);
         all.normal_force = 0.0;
         all.touched = false;

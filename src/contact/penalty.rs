@@ -48,8 +48,10 @@ const STIFFNESS: usize = 13;
 const STATUS: usize = 14;
 
 /// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: a surface node that is
-/// first seen deeper inside an open yarn came in through its end, and no side pushes it out.
+/// first seen deeper inside an open yarn came in through its end, and no side pushes it out. Bodies may overlap at the start.
 const ENTRY: f64 = 1e-3;
+/// Bound on approach from which on the scene is looked at before it moves, mm/s.
+pub const AT_REST: f64 = 1e20;
 /// Force that stands for a touch without pressure, N.
 const TOUCH: f64 = 1e-30;
 
@@ -150,7 +152,7 @@ impl Kernel for Penalty {
                 let elastic = [state[0], state[1], state[2]];
                 let tangential = penalty * real(params.tangential);
                 let open = !is_thread && surface.bodies[body].closed == 0;
-                let enters = open && state[3] <= zero;
+                let enters = open && state[3] <= zero && io.row.approach < constant(AT_REST);
                 let (near, single);
                 let faces = if is_thread && point.distance < radius {
                     near = surface.faces_within(slave, body, image, place, (corners, point), radius);
