@@ -267,6 +267,7 @@ impl Simulation {
         self.dt_before = self.dt;
         self.search()?;
         let totals = self.diagnose()?;
+        self.guard_step()?;
         self.choose_dt();
         self.dt_before = self.dt;
         self.set_state(&totals);
