@@ -48,7 +48,7 @@ fn a_body_that_flies_away() {
         assert_eq!(guard.cause, "position range");
         assert!(guard.culprit.contains("bullet"), "{guard}");
         let reached = simulation.fluctuations().iter().fold(0.0, |most: f64, w| most.max(w[2].abs()));
-        assert!((255.0..300.0).contains(&reached), "{reached} mm");
+        assert!((252.0..256.0).contains(&reached), "{reached} mm");
     }
 }
 
@@ -101,7 +101,7 @@ fn bodies_that_run_through_each_other() {
     let case = scene(
         json!([cube("target", [0.0; 3]), thrown]),
         json!({ "yarn_penalty_n_mm3": 5 }),
-        json!({ "penetration_tolerance": 0.2 }),
+        json!({ "penetration_tolerance": 0.2, "energy_tolerance": 100 }),
     );
     let guard = stopped(&mut start(&case, F64), 1e-3);
     assert_eq!(guard.cause, "penetration");
@@ -110,11 +110,12 @@ fn bodies_that_run_through_each_other() {
 
 #[test]
 fn a_contact_force_beyond_its_integer() {
+    // on a soft penalty the damping of a fast approach outgrows any elastic force
     let mut thrown = cube("thrown", [0.1, 0.2, 1.01]);
-    thrown["velocity_mm_s"] = json!([0, 0, -9e6]);
+    thrown["velocity_mm_s"] = json!([0, 0, -2e6]);
     let case = scene(
         json!([cube("target", [0.0; 3]), thrown]),
-        json!({ "yarn_penalty_n_mm3": 1e6, "damping_ratio": 1, "skin_mm": 2 }),
+        json!({ "yarn_penalty_n_mm3": 0.01, "damping_ratio": 1 }),
         json!({ "dt_max_s": 1e-9, "energy_tolerance": 100, "penetration_tolerance": 100 }),
     );
     let guard = stopped(&mut start(&case, F64), 1e-3);

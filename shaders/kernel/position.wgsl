@@ -18,8 +18,8 @@ fn carry(quanta: i32, remainder: ptr<function, f32>) -> i32 {
     return quanta + whole;
 }
 
-// Largest displacement along an axis, mm; a little inside of the range of quanta.
-const MOST_MM: f32 = 255.0;
+// Largest displacement along an axis, mm; so far inside of the range of quanta that no node leaves it between two looks.
+const MOST_MM: f32 = 252.0;
 
 // A displacement, mm.
 fn displacement(quanta: i32, remainder: f32) -> f32 {

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 pub struct Expect {
     /// How the run ends. Default `finished`.
     pub verdict: Verdict,
-    /// Largest relative error of the energy balance at any time, without its sign.
+    /// Largest error of the energy balance at any time, without its sign, over the largest energy of the run.
     pub energy_balance: Option<Bounds>,
     /// Smallest det F of all hexahedra at any time.
     pub min_jacobian: Option<Bounds>,
@@ -84,6 +84,8 @@ pub enum Quantity {
 pub enum Verdict {
     #[default]
     Finished,
+    /// By any guard: which one is first may be chance.
+    Stopped,
     NonFinite,
     PositionRange,
     Inversion,
@@ -95,8 +97,9 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 10] = [
         Self::Finished,
+        Self::Stopped,
         Self::NonFinite,
         Self::PositionRange,
         Self::Inversion,
@@ -111,6 +114,7 @@ impl Verdict {
     pub fn name(self) -> &'static str {
         match self {
             Self::Finished => "finished",
+            Self::Stopped => "stopped",
             Self::NonFinite => "non-finite",
             Self::PositionRange => "position range",
             Self::Inversion => "inversion",
@@ -120,6 +124,11 @@ impl Verdict {
             Self::ForceRange => "force range",
             Self::ContactOverflow => "contact overflow",
         }
+    }
+
+    /// Whether a run that ended in one way is as expected.
+    pub fn covers(self, ended: Self) -> bool {
+        self == ended || self == Self::Stopped && ended != Self::Finished
     }
 
     /// The verdict of a run that a guard stopped for a cause.

@@ -27,8 +27,8 @@ pub fn carry<R: Real>(quanta: i32, remainder: R) -> (i32, R) {
     (quanta.wrapping_add(whole), remainder - R::from_i32(whole) * R::from_f64(QUANTUM))
 }
 
-/// Largest displacement along an axis, mm; a little inside of the range of quanta.
-pub const MOST_MM: f64 = 255.0;
+/// Largest displacement along an axis, mm; so far inside of the range of quanta that no node leaves it between two looks.
+pub const MOST_MM: f64 = 252.0;
 
 /// A displacement, mm.
 #[inline(always)]
