@@ -13,7 +13,7 @@ use tricot::study::stability::scenes;
 const FOLDER: &str = "cases/hard";
 
 /// What is shorter here than in the study.
-const SHORTER: [(&str, &str); 1] = [("long_rest_under_tension", "steps.2.hold.time_s=5e-3")];
+const SHORTER: [(&str, &str); 1] = [("long_rest_under_tension", "steps.3.hold.time_s=5e-3")];
 
 /// Scenes of few steps, for a device in software.
 const SMALL: [&str; 5] =

@@ -37,7 +37,7 @@ fn travel(node: u32) {
         let i = node + k * plane;
         let d = difference(quanta[i], remainder[i], search_quanta[i], search_remainder[i]);
         square = square + d * d;
-        furthest = max(furthest, abs(displacement(quanta[i], remainder[i])));
+        furthest = max(furthest, abs(in_mm(quanta[i], remainder[i])));
     }
     if !is_finite(square) {
         atomicOr(&status[FLAGS], NOT_FINITE);

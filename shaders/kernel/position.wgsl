@@ -22,7 +22,7 @@ fn carry(quanta: i32, remainder: ptr<function, f32>) -> i32 {
 const MOST_MM: f32 = 252.0;
 
 // A displacement, mm.
-fn displacement(quanta: i32, remainder: f32) -> f32 {
+fn in_mm(quanta: i32, remainder: f32) -> f32 {
     return f32(quanta) * QUANTUM + remainder;
 }
 

@@ -3,7 +3,7 @@
 use super::status;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
-use crate::kernel::position::{MOST_MM, difference, displacement};
+use crate::kernel::position::{MOST_MM, difference, in_mm};
 use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::dot;
@@ -58,7 +58,7 @@ impl Kernel for Travel {
                 let i = node + k * plane;
                 let d = difference(quanta[i], remainder[i], search_quanta[i], search_remainder[i]);
                 square = square + d * d;
-                furthest = furthest.max(displacement(quanta[i], remainder[i]).abs());
+                furthest = furthest.max(in_mm(quanta[i], remainder[i]).abs());
             }
             if !square.is_finite() {
                 status[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);

@@ -32,7 +32,7 @@ pub const MOST_MM: f64 = 252.0;
 
 /// A displacement, mm.
 #[inline(always)]
-pub fn displacement<R: Real>(quanta: i32, remainder: R) -> R {
+pub fn in_mm<R: Real>(quanta: i32, remainder: R) -> R {
     R::from_i32(quanta) * R::from_f64(QUANTUM) + remainder
 }
 
