@@ -49,10 +49,11 @@
 //! | [`output`] | frames, tables, maps, pictures, pages, checkpoints |
 //! | [`simulate`] | a scene in time: steps, contact searches, energies, guards |
 //! | [`run`] | a case with its files: what the program calls |
+//! | [`study`] | many cases at once: tables over a folder of scenes |
 //!
 //! Imports point one way: a module knows only those before it in this list (`tests/structure.rs` checks it).
 //! ```text
-//! error kernel case mesh fabric materials elements contact dynamics conditions plan backend measure schedule output simulate run
+//! error kernel case mesh fabric materials elements contact dynamics conditions plan backend measure schedule output simulate run study
 //! ```
 //! Moreover, the backend knows only `error` and `kernel`, and `output` does not know `measure`.
 //!
@@ -81,3 +82,4 @@ pub mod plan;
 pub mod run;
 pub mod schedule;
 pub mod simulate;
+pub mod study;

@@ -9,6 +9,7 @@ use tricot::case::{schema, steps};
 use tricot::error::{Error, Result};
 use tricot::output::directory;
 use tricot::run;
+use tricot::study::stability::stability;
 
 const UNEXPECTED: u8 = 1;
 const BAD_INPUT: u8 = 2;
@@ -30,11 +31,12 @@ Examples:
   tricot run cases/unit_cell_shear.json -o results/cell --resume
   tricot picture results/cell
   tricot report results/cell
+  tricot study stability cases/hard
   tricot schema > case.schema.json
 
 Exit codes:
   0    done
-  1    unexpected failure inside tricot
+  1    unexpected failure inside tricot, or a study whose scenes do not show what they should
   2    bad input: command line, case or fabric
   3    a guard stopped the run; results so far stay on disk
   4    a file or folder could not be read or written
@@ -109,6 +111,11 @@ enum Command {
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
     },
+    /// Run many cases and put them into one table.
+    Study {
+        #[command(subcommand)]
+        study: StudyCommand,
+    },
     /// Draw a frame as PNG.
     Picture {
         /// Folder of a run (its last frame is drawn), or a frame (.vtu)
@@ -123,6 +130,22 @@ enum Command {
         /// The picture [default: picture.png in the folder, or beside the frame under its name]
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
+    },
+}
+
+#[derive(Subcommand)]
+enum StudyCommand {
+    /// Run every case of a folder to its end, and say which do not show what their `expect` says.
+    Stability {
+        /// Folder of cases
+        #[arg(value_name = "FOLDER", default_value = "cases/hard")]
+        folder: PathBuf,
+        /// What runs the scenes: cpu in f32 and f64, gpu, or auto for both as far as they are there
+        #[arg(long, default_value = "auto")]
+        backend: Machine,
+        /// The table
+        #[arg(short, long, value_name = "FILE", default_value = "results/stability.csv")]
+        output: PathBuf,
     },
 }
 
@@ -235,6 +258,10 @@ fn perform(command: Command) -> Result<Done> {
         Command::Report { source, output } => {
             let out = output.unwrap_or_else(|| source.join("report.html"));
             run::report(&source, &out)?
+        }
+        Command::Study { study: StudyCommand::Stability { folder, backend, output } } => {
+            let study = stability(&folder, backend.into(), &output)?;
+            return Ok(Done { text: study.text, code: if study.held { 0 } else { UNEXPECTED } });
         }
         Command::Picture { source, field, width, output } => {
             let out = output.unwrap_or_else(|| picture_path(&source));

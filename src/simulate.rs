@@ -41,6 +41,8 @@ const SKIN_USED: f64 = 0.35;
 const AFFINE_REACH: f64 = 2.0;
 /// Speeds may grow by this factor during a burst.
 const SPEED_MARGIN: f64 = 2.0;
+/// Farthest that nodes may travel in a burst, mm, so that the range of positions is left by less than what wraps around.
+const FARTHEST: f64 = 3.0;
 /// Step that a run starts with, as a share of the limit: legs that start crushed need it while they relax.
 const FIRST_SHARE: f64 = 0.4;
 /// Time over which the first share grows to one, s.
@@ -267,6 +269,7 @@ impl Simulation {
         self.dt_before = self.dt;
         self.search()?;
         let totals = self.diagnose()?;
+        self.guard_step()?;
         self.choose_dt();
         self.dt_before = self.dt;
         self.set_state(&totals);
@@ -306,7 +309,7 @@ impl Simulation {
             left = SKIN_USED * skin;
         }
         // a float that is too large for an integer becomes the largest one
-        let sure = (left / (SPEED_MARGIN * self.speed * self.dt)) as u64;
+        let sure = (left.min(FARTHEST) / (SPEED_MARGIN * self.speed * self.dt)) as u64;
         let longer = if self.speed > CALM * before { BURST } else { 2 * self.burst };
         self.burst = longer.min(sure).clamp(BURST, WINDOW);
         Ok(())

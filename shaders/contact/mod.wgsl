@@ -13,6 +13,7 @@ const CELL_FULL: u32 = 1u;
 const SLOTS_FULL: u32 = 2u;
 const FORCE_RANGE: u32 = 4u;
 const NOT_FINITE: u32 = 8u;
+const OUT_OF_RANGE: u32 = 16u;
 
 // Whether a number is neither infinite nor not a number; by its bits, since compilers may assume that it is.
 fn is_finite(x: f32) -> bool {

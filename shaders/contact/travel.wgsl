@@ -1,4 +1,4 @@
-// How far nodes have moved since the last search, how fast they are, and whether they are still numbers.
+// How far nodes have moved since the last search, how fast they are, and whether they are still numbers in range.
 
 #include "kernel/position"
 #if travel
@@ -32,13 +32,17 @@ fn remember(node: u32) {
 fn travel(node: u32) {
     let plane = arrayLength(&remainder) / 3u;
     var square = 0.0;
+    var furthest = 0.0;
     for (var k = 0u; k < 3u; k++) {
         let i = node + k * plane;
         let d = difference(quanta[i], remainder[i], search_quanta[i], search_remainder[i]);
         square = square + d * d;
+        furthest = max(furthest, abs(in_mm(quanta[i], remainder[i])));
     }
     if !is_finite(square) {
         atomicOr(&status[FLAGS], NOT_FINITE);
+    } else if furthest > MOST_MM {
+        atomicOr(&status[FLAGS], OUT_OF_RANGE);
     }
     let v = vec3<f32>(velocity[node], velocity[node + plane], velocity[node + 2u * plane]);
     raise(TRAVEL, sqrt(square));

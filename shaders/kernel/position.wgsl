@@ -18,6 +18,14 @@ fn carry(quanta: i32, remainder: ptr<function, f32>) -> i32 {
     return quanta + whole;
 }
 
+// Largest displacement along an axis, mm; so far inside of the range of quanta that no node leaves it between two looks.
+const MOST_MM: f32 = 252.0;
+
+// A displacement, mm.
+fn in_mm(quanta: i32, remainder: f32) -> f32 {
+    return f32(quanta) * QUANTUM + remainder;
+}
+
 // Difference of two positions, mm.
 fn difference(quanta: i32, remainder: f32, from_quanta: i32, from_remainder: f32) -> f32 {
     return f32(quanta - from_quanta) * QUANTUM + (remainder - from_remainder);

@@ -5,6 +5,7 @@ pub mod conform;
 pub mod defaults;
 pub mod domain;
 pub mod effects;
+pub mod expect;
 pub mod fabric;
 pub mod nearest;
 pub mod origin;
@@ -16,6 +17,7 @@ pub mod steps;
 
 use domain::{Domain, Resolution};
 use effects::Effects;
+use expect::Expect;
 use fabric::Fabric;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -49,6 +51,9 @@ pub struct Case {
     /// What is written.
     #[serde(default)]
     pub output: Output,
+    /// What the case must show, for scenes that test the solver; a run takes no notice of it. Default null.
+    #[serde(default)]
+    pub expect: Option<Expect>,
 }
 
 /// A fabric, or where to find it.

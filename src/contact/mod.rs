@@ -105,8 +105,10 @@ pub mod status {
     pub const SLOTS_FULL: u32 = 2;
     /// A contact force outgrew its integer.
     pub const FORCE_RANGE: u32 = 4;
-    /// A position left the range of its quanta, or is not a number.
+    /// A position is not a number.
     pub const NOT_FINITE: u32 = 8;
+    /// A displacement left the range of its quanta.
+    pub const OUT_OF_RANGE: u32 = 16;
 }
 
 /// Key of a candidate: what is touched, and in which lateral image, −8 to 7 periods along x and y.

@@ -1,9 +1,9 @@
-//! How far nodes have moved since the last search, how fast they are, and whether they are still numbers.
+//! How far nodes have moved since the last search, how fast they are, and whether they are still numbers in range.
 
 use super::status;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
-use crate::kernel::position::difference;
+use crate::kernel::position::{MOST_MM, difference, in_mm};
 use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::dot;
@@ -53,14 +53,17 @@ impl Kernel for Travel {
         let velocity = Field::new(io, VELOCITY);
         let (mut largest, mut fastest) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(0.0));
         for node in items {
-            let mut square = L::Scalar::from_f64(0.0);
+            let (mut square, mut furthest) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(0.0));
             for k in 0..3 {
                 let i = node + k * plane;
                 let d = difference(quanta[i], remainder[i], search_quanta[i], search_remainder[i]);
                 square = square + d * d;
+                furthest = furthest.max(in_mm(quanta[i], remainder[i]).abs());
             }
             if !square.is_finite() {
                 status[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
+            } else if furthest > L::Scalar::from_f64(MOST_MM) {
+                status[status::FLAGS].fetch_or(status::OUT_OF_RANGE, Ordering::Relaxed);
             }
             largest = largest.max(square);
             let v = velocity.at(node);

@@ -27,6 +27,15 @@ pub fn carry<R: Real>(quanta: i32, remainder: R) -> (i32, R) {
     (quanta.wrapping_add(whole), remainder - R::from_i32(whole) * R::from_f64(QUANTUM))
 }
 
+/// Largest displacement along an axis, mm; so far inside of the range of quanta that no node leaves it between two looks.
+pub const MOST_MM: f64 = 252.0;
+
+/// A displacement, mm.
+#[inline(always)]
+pub fn in_mm<R: Real>(quanta: i32, remainder: R) -> R {
+    R::from_i32(quanta) * R::from_f64(QUANTUM) + remainder
+}
+
 /// Difference of two positions, mm.
 #[inline(always)]
 pub fn difference<R: Real>(quanta: i32, remainder: R, from_quanta: i32, from_remainder: R) -> R {

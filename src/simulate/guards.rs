@@ -3,6 +3,10 @@
 use super::Simulation;
 use crate::contact::status;
 use crate::error::{Error, Guard, Result};
+use crate::kernel::position::MOST_MM;
+
+/// A step that is longer than the estimated limit by this factor is unstable for sure: the estimate is a bound from below.
+const SURELY_UNSTABLE: f64 = 2.0;
 
 impl Simulation {
     pub(super) fn guards(&self) -> Result<()> {
@@ -10,6 +14,7 @@ impl Simulation {
         if !h.balance.is_finite() {
             return Err(self.guard("non-finite", "the energy is not a number".into(), "lower integration.safety"));
         }
+        self.guard_step()?;
         if h.min_jacobian <= 0.0 {
             let culprit = format!(
                 "hexahedron {} of {} has det F = {:.3e}",
@@ -49,6 +54,23 @@ impl Simulation {
         Ok(())
     }
 
+    /// Stops a step that the user fixed and that cannot be stable; one that follows the estimate shortens by itself.
+    pub(super) fn guard_step(&self) -> Result<()> {
+        let limit = self.health.dt_limit;
+        match self.case.integration.dt_s {
+            Some(dt) if dt > SURELY_UNSTABLE * limit => {
+                let node = self.health.limiting_node;
+                let culprit = format!(
+                    "the step of {dt:.3e} s is longer than {SURELY_UNSTABLE} times the estimated limit of {limit:.3e} s, \
+                     which node {node} ({}) sets",
+                    self.node_owner(node)
+                );
+                Err(self.guard("time step", culprit, "lower integration.dt_s, or leave it out"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Name of the yarn that owns a hexahedron.
     pub(super) fn hex_owner(&self, hex: usize) -> String {
         let mut first = 0;
@@ -70,9 +92,22 @@ impl Simulation {
         if flags & status::NOT_FINITE != 0 {
             let culprit = match self.first_not_finite() {
                 Some(node) => format!("the position of node {node} ({}) is not a number", self.node_owner(node)),
-                None => "a position left the range of ±256 mm or is not a number".into(),
+                None => "a position is not a number".into(),
             };
             return Err(self.guard("non-finite", culprit, "lower integration.safety or integration.dt_max_s"));
+        }
+        if flags & status::OUT_OF_RANGE != 0 {
+            let culprit = match self.furthest() {
+                Some((node, mm)) => {
+                    format!("node {node} ({}) has moved {mm:.1} mm (limit {MOST_MM} mm)", self.node_owner(node))
+                }
+                None => format!("a node has moved more than {MOST_MM} mm"),
+            };
+            return Err(self.guard(
+                "position range",
+                culprit,
+                "hold bodies that nothing holds, or shorten the load steps",
+            ));
         }
         if flags & status::FORCE_RANGE != 0 {
             let node = status[status::CULPRIT] as usize;
@@ -80,6 +115,12 @@ impl Simulation {
             return Err(self.guard("force range", culprit, "lower integration.safety, or load more slowly"));
         }
         Ok(())
+    }
+
+    /// The node with the largest displacement along an axis, and that, mm.
+    fn furthest(&self) -> Option<(usize, f64)> {
+        let reach = |w: [f64; 3]| w.iter().fold(0.0, |most: f64, c| most.max(c.abs()));
+        self.fluctuations().into_iter().map(reach).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     pub(super) fn first_not_finite(&self) -> Option<usize> {

@@ -1,0 +1,237 @@
+//! One scene from start to end without files: what guards and reports look at on the way, and whether the case's expectations
+//! hold.
+
+use crate::case::expect::{Expect, Quantity, Verdict};
+use crate::case::read::read;
+use crate::error::{Error, Result};
+use crate::mesh::{Mesh, vector};
+use crate::run;
+use crate::simulate::{Energies, Make, Simulation};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What was seen of a run.
+#[derive(Debug, Clone)]
+pub struct Observed {
+    pub verdict: Verdict,
+    /// What the guard said; empty if the run finished.
+    pub message: String,
+    pub steps: u64,
+    /// Smallest step, and smallest estimated limit without factors, s.
+    pub dt: f64,
+    pub dt_limit: f64,
+    /// Largest error of the energy balance, without its sign, over the largest energy.
+    pub balance: f64,
+    /// Largest penetration of any kind, mm.
+    pub penetration: f64,
+    /// Smallest det F.
+    pub min_jacobian: f64,
+    /// Energies at the end.
+    pub energies: Energies,
+    /// Distance of every node from where it started, at the end, sorted, mm.
+    pub displacements: Vec<f64>,
+    /// Largest distance of a node from where it was when the last load step began, mm.
+    pub drift: f64,
+    pub thickness_ratio: f64,
+    /// Largest force in a beam, N, and that in the last beam of the first thread over that in its first.
+    pub tension: f64,
+    pub tension_ratio: f64,
+}
+
+/// Scenes on one machine; each is run once.
+pub struct Scenes {
+    make: Make,
+    seen: BTreeMap<PathBuf, Observed>,
+}
+
+impl Scenes {
+    pub fn new(make: Make) -> Self {
+        Self { make, seen: BTreeMap::new() }
+    }
+
+    /// Runs a case with overrides, and says which expectations do not hold.
+    ///
+    /// # Errors
+    /// A case that cannot be run. A guard that stops the run is a verdict.
+    pub fn examine(&mut self, path: &Path, overrides: &[String]) -> Result<(Observed, Vec<String>)> {
+        let loaded = read(path, overrides)?;
+        let mut case = loaded.clone();
+        case.case.integration.precision = self.make.precision;
+        let observed = match self.seen.get(path) {
+            Some(observed) => observed.clone(),
+            None => observe(run::simulation(&case, self.make.clone())?)?,
+        };
+        self.seen.insert(path.to_path_buf(), observed.clone());
+        let Some(expect) = &loaded.case.expect else { return Ok((observed, Vec::new())) };
+        let mut broken = observed.broken(expect);
+        if let Some(same) = &expect.same_as {
+            let other = path.parent().unwrap_or(Path::new("")).join(&same.case);
+            let (other, _) = self.examine(&other, &[])?;
+            let apart = observed.apart(&other, same.quantity);
+            let agree = apart <= same.within;
+            if !agree {
+                broken.push(format!("differs from {} by {apart:.3e}", same.case.display()));
+            }
+        }
+        Ok((observed, broken))
+    }
+}
+
+/// Runs a simulation to its end or to a guard.
+fn observe(mut simulation: Simulation) -> Result<Observed> {
+    let mut seen = Observed {
+        verdict: Verdict::Finished,
+        message: String::new(),
+        steps: 0,
+        dt: f64::INFINITY,
+        dt_limit: f64::INFINITY,
+        balance: 0.0,
+        penetration: 0.0,
+        min_jacobian: f64::INFINITY,
+        energies: Energies::default(),
+        displacements: Vec::new(),
+        drift: 0.0,
+        thickness_ratio: f64::NAN,
+        tension: f64::NAN,
+        tension_ratio: f64::NAN,
+    };
+    let mut before = simulation.fluctuations();
+    if let Err(error) = simulation.advance(0.0, |_| false) {
+        seen.stop(error)?;
+        return Ok(seen);
+    }
+    let mut ledger = Ledger::new(simulation.energies());
+    let ends: Vec<f64> = simulation.schedule.phases().iter().map(|phase| phase.end).collect();
+    for end in ends {
+        before = simulation.fluctuations();
+        let result = simulation.advance(end, |s| {
+            seen.look(s);
+            ledger.look(s.energies());
+            false
+        });
+        if let Err(error) = result {
+            seen.stop(error)?;
+            seen.look(&simulation);
+            ledger.look(simulation.energies());
+            break;
+        }
+    }
+    seen.balance = ledger.error / ledger.largest;
+    seen.end(&simulation, &before);
+    simulation.alive()?;
+    Ok(seen)
+}
+
+/// The balance of energies over a whole run: what is small beside the energy that a run has in the end is no error, however
+/// large it is beside what was there when it arose.
+struct Ledger {
+    start: f64,
+    /// Largest error and largest energy so far, mJ.
+    error: f64,
+    largest: f64,
+}
+
+impl Ledger {
+    fn new(e: &Energies) -> Self {
+        Self { start: e.output() - e.input(), error: 0.0, largest: f64::MIN_POSITIVE }
+    }
+
+    fn look(&mut self, e: &Energies) {
+        let error = (e.output() - e.input() - self.start).abs();
+        // a maximum would forget what is not a number
+        if error.is_nan() || error > self.error {
+            self.error = error;
+        }
+        self.largest = self.largest.max(e.output());
+    }
+}
+
+impl Observed {
+    /// Takes note of a window.
+    fn look(&mut self, s: &Simulation) {
+        let h = s.health();
+        self.steps = s.step();
+        self.dt = self.dt.min(s.dt());
+        self.dt_limit = self.dt_limit.min(h.dt_limit);
+        self.penetration = h.penetration.iter().copied().fold(self.penetration, f64::max);
+        self.min_jacobian = self.min_jacobian.min(h.min_jacobian);
+    }
+
+    /// Takes note of a guard; another error is passed on.
+    fn stop(&mut self, error: Error) -> Result<()> {
+        let Error::Guard(guard) = error else { return Err(error) };
+        self.verdict = Verdict::of_cause(&guard.cause).unwrap_or(Verdict::Stopped);
+        self.message = guard.to_string();
+        Ok(())
+    }
+
+    /// Takes note of the end.
+    fn end(&mut self, s: &Simulation, before: &[[f64; 3]]) {
+        let now = s.fluctuations();
+        self.energies = *s.energies();
+        self.drift = now.iter().zip(before).map(|(a, b)| vector::norm(vector::sub(*a, *b))).fold(0.0, f64::max);
+        self.displacements = now.iter().map(|w| vector::norm(*w)).collect();
+        self.displacements.sort_by(f64::total_cmp);
+        self.thickness_ratio = thickness_ratio(&s.mesh, &now);
+        let tensions = s.tensions();
+        self.tension = tensions.iter().copied().fold(f64::NAN, f64::max);
+        if let Some(thread) = s.mesh.threads.first() {
+            self.tension_ratio = tensions[thread.count - 2] / tensions[0];
+        }
+    }
+
+    /// How far two runs are apart, relative to the other one.
+    fn apart(&self, other: &Self, quantity: Quantity) -> f64 {
+        match quantity {
+            Quantity::Displacements if self.displacements.len() != other.displacements.len() => f64::NAN,
+            Quantity::Displacements => {
+                let pairs = self.displacements.iter().zip(&other.displacements);
+                let most = other.displacements.last().copied().unwrap_or(f64::NAN);
+                pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / most
+            }
+            Quantity::InternalEnergy => (self.energies.internal() / other.energies.internal() - 1.0).abs(),
+        }
+    }
+
+    /// Every expectation that does not hold, in words.
+    fn broken(&self, expect: &Expect) -> Vec<String> {
+        let mut broken = Vec::new();
+        if !expect.verdict.covers(self.verdict) {
+            let message = if self.message.is_empty() { "it finished" } else { &self.message };
+            broken.push(format!("expected {}, but {message}", expect.verdict.name()));
+        }
+        let e = &self.energies;
+        let furthest = self.displacements.last().copied().unwrap_or(f64::NAN);
+        for (name, bounds, number) in [
+            ("energy_balance", expect.energy_balance, self.balance),
+            ("min_jacobian", expect.min_jacobian, self.min_jacobian),
+            ("penetration_mm", expect.penetration_mm, self.penetration),
+            ("kinetic_mj", expect.kinetic_mj, e.kinetic),
+            ("internal_mj", expect.internal_mj, e.internal()),
+            ("friction_mj", expect.friction_mj, e.friction),
+            ("displacement_mm", expect.displacement_mm, furthest),
+            ("drift_mm", expect.drift_mm, self.drift),
+            ("thickness_ratio", expect.thickness_ratio, self.thickness_ratio),
+            ("tension_n", expect.tension_n, self.tension),
+            ("tension_ratio", expect.tension_ratio, self.tension_ratio),
+        ] {
+            if bounds.is_some_and(|bounds| !bounds.hold(number)) {
+                broken.push(format!("{name} is {number:.4e}"));
+            }
+        }
+        broken
+    }
+}
+
+/// Smallest distance between the lowest and the highest layer of nodes of the first block over that at the start.
+fn thickness_ratio(mesh: &Mesh, moved: &[[f64; 3]]) -> f64 {
+    let Some(block) = mesh.blocks.first() else { return f64::NAN };
+    let layer = block.count() / (block.layers + 1);
+    let ratio = |low: usize| {
+        let high = low + layer * block.layers;
+        let at_rest = vector::sub(mesh.nodes[high], mesh.nodes[low]);
+        let change = vector::sub(moved[high], moved[low]);
+        vector::norm([0, 1, 2].map(|k| at_rest[k] + change[k])) / vector::norm(at_rest)
+    };
+    (block.first..block.first + layer).map(ratio).fold(f64::INFINITY, f64::min)
+}
