@@ -100,8 +100,8 @@ fn bodies_that_run_through_each_other() {
     thrown["velocity_mm_s"] = json!([0, 0, -2e4]);
     let case = scene(
         json!([cube("target", [0.0; 3]), thrown]),
-        json!({ "yarn_penalty_n_mm3": 0.5 }),
-        json!({ "penetration_tolerance": 0.2, "energy_tolerance": 100 }),
+        json!({ "yarn_penalty_n_mm3": 5 }),
+        json!({ "penetration_tolerance": 0.02, "energy_tolerance": 100 }),
     );
     let guard = stopped(&mut start(&case, F64), 1e-3);
     assert_eq!(guard.cause, "penetration");
