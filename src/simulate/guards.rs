@@ -54,11 +54,14 @@ impl Simulation {
         Ok(())
     }
 
-    /// Stops a step that the user fixed and that cannot be stable; one that follows the estimate shortens by itself.
+    /// Stops a step that the user fixed and that cannot be stable; one that follows the estimate shortens by itself. The
+    /// estimate counts prescribed nodes too, which cannot swing: where one of them sets it, it proves nothing.
     pub(super) fn guard_step(&self) -> Result<()> {
         let limit = self.health.dt_limit;
         match self.case.integration.dt_s {
-            Some(dt) if dt > SURELY_UNSTABLE * limit => {
+            Some(dt)
+                if dt > SURELY_UNSTABLE * limit && !self.prescribed_nodes().contains(&self.health.limiting_node) =>
+            {
                 let node = self.health.limiting_node;
                 let culprit = format!(
                     "the step of {dt:.3e} s is longer than {SURELY_UNSTABLE} times the estimated limit of {limit:.3e} s, \
