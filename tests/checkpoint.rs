@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{advance, bare, block, loaded, neo_hookean, with};
+use common::{advance, bare, block, coarse_cell, loaded, neo_hookean, with};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,22 +14,15 @@ use tricot::fabric;
 use tricot::plan::Capacity;
 use tricot::simulate::{Make, Simulation};
 
-/// A coarse cell of the shipped fabric, tightened fast so that threads and yarns touch.
+/// The coarse cell with a hold, frames and frequent checkpoints.
 fn cell() -> Value {
-    let fabric: Value = serde_json::from_str(include_str!("../cases/fabrics/px35.json")).unwrap();
-    json!({
-        "title": "coarse cell",
-        "fabric": fabric,
-        "domain": { "cell": {} },
-        "resolution": { "warp_columns": 6, "weft_columns": 4, "slice_mm": 0.8, "beams_per_lap": 32 },
-        "steps": [
-            { "pretension": { "time_s": 1.5e-4 } },
-            { "hold": { "time_s": 2e-5 } },
-            { "shear": { "angle_deg": 3, "time_s": 1e-4 } }
-        ],
-        "integration": { "energy_tolerance": 100 },
-        "output": { "rows_per_step": 6, "frames_at_deg": [1, 2], "pictures": false, "checkpoint_wall_s": 0.02 }
-    })
+    let steps = json!([
+        { "pretension": { "time_s": 1.5e-4 } },
+        { "hold": { "time_s": 2e-5 } },
+        { "shear": { "angle_deg": 3, "time_s": 1e-4 } }
+    ]);
+    let output = json!({ "rows_per_step": 6, "frames_at_deg": [1, 2], "pictures": false, "checkpoint_wall_s": 0.02 });
+    with(coarse_cell(), &[("/steps", steps), ("/output", output)])
 }
 
 /// Blocks that are pushed onto each other, slide and fall.

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Random, advance, bare, block, charmetant, loaded, neo_hookean, with};
+use common::{Random, advance, bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, with};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -30,32 +30,6 @@ fn device() -> Option<Arc<Device>> {
         Err(error) => panic!("{error}"),
     };
     DEVICE.get_or_init(open).clone()
-}
-
-/// A coarse cell of the shipped fabric, tightened fast so that threads and yarns touch.
-fn cell() -> Value {
-    let fabric: Value = serde_json::from_str(include_str!("../cases/fabrics/px35.json")).unwrap();
-    json!({
-        "title": "coarse cell",
-        "fabric": fabric,
-        "domain": { "cell": {} },
-        "resolution": { "warp_columns": 6, "weft_columns": 4, "slice_mm": 0.8, "beams_per_lap": 32 },
-        "steps": [{ "pretension": { "time_s": 1.5e-4 } }, { "shear": { "angle_deg": 3, "time_s": 1e-4 } }],
-        "integration": { "energy_tolerance": 100 },
-        "effects": {}
-    })
-}
-
-/// A small specimen with threads held at its cuts, tightened fast.
-fn specimen() -> Value {
-    let domain = json!({ "specimen": { "length_mm": 20, "width_mm": 14, "displacement_mm": 0.01 } });
-    with(
-        cell(),
-        &[
-            ("/domain", domain),
-            ("/steps", json!([{ "pretension": { "time_s": 1.5e-4 } }, { "move": { "time_s": 1e-4 } }])),
-        ],
-    )
 }
 
 /// Two blocks of different laws that touch, one held, with a loose thread, gravity and open fibre lines.
@@ -183,7 +157,7 @@ fn every_stage_agrees_with_the_cpu_on_every_buffer() {
     println!("{:?}", device.listed());
     let mut found = BTreeMap::new();
     let make = || Make { threads: 1, ..Make::default() };
-    for case in [cell(), specimen(), free()] {
+    for case in [coarse_cell(), held_specimen(), free()] {
         let end = 2.5e-4f64.min(if case["domain"].get("mesh").is_none() { 1.0 } else { 1e-4 });
         let mut simulation = run::simulation(&loaded(&case), make()).unwrap();
         // a state in mid-run, then random ones

@@ -2,27 +2,13 @@
 
 mod common;
 
-use common::{advance, loaded};
-use serde_json::{Value, json};
+use common::{advance, coarse_cell, loaded};
 use tricot::case::steps::Precision;
 use tricot::fabric;
 use tricot::kernel::lane::Isa;
 use tricot::plan::Capacity;
 use tricot::run;
 use tricot::simulate::{Make, Simulation};
-
-/// A coarse cell of the shipped fabric, with every effect, tightened fast so that threads and yarns touch.
-fn cell() -> Value {
-    let fabric: Value = serde_json::from_str(include_str!("../cases/fabrics/px35.json")).unwrap();
-    json!({
-        "title": "coarse cell",
-        "fabric": fabric,
-        "domain": { "cell": {} },
-        "resolution": { "warp_columns": 6, "weft_columns": 4, "slice_mm": 0.8, "beams_per_lap": 32 },
-        "steps": [{ "pretension": { "time_s": 1.5e-4 } }, { "shear": { "angle_deg": 3, "time_s": 1e-4 } }],
-        "integration": { "energy_tolerance": 100 }
-    })
-}
 
 #[test]
 fn bits_do_not_depend_on_threads_or_instruction_set() {
@@ -31,7 +17,7 @@ fn bits_do_not_depend_on_threads_or_instruction_set() {
         let mut makes: Vec<Make> = [1, 1, 2, 7].map(|threads| Make { precision, threads, ..Make::default() }).into();
         makes.extend(Isa::available().into_iter().map(|isa| Make { precision, threads: 2, isa, ..Make::default() }));
         for make in makes {
-            let mut simulation = run::simulation(&loaded(&cell()), make.clone()).unwrap();
+            let mut simulation = run::simulation(&loaded(&coarse_cell()), make.clone()).unwrap();
             advance(&mut simulation, 2.5e-4);
             let touching = simulation.health().touching;
             let hash = simulation.state_hash();
@@ -52,7 +38,7 @@ fn bits_do_not_depend_on_threads_or_instruction_set() {
 
 #[test]
 fn contact_tables_that_overflow_and_grow_leave_no_trace() {
-    let loaded = loaded(&cell());
+    let loaded = loaded(&coarse_cell());
     let positions = |capacity: Capacity| {
         let mesh = fabric::build(&loaded.case, loaded.fabric.as_ref()).unwrap();
         let friction = loaded.fabric.as_ref().unwrap().friction;

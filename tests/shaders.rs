@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{bare, block, charmetant, loaded, neo_hookean, with};
+use common::{bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, with};
 use naga::{AddressSpace, ScalarKind, StorageAccess, TypeInner};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,22 +19,7 @@ use tricot::{conditions, contact, dynamics, elements};
 
 /// Scenes that together have every effect, and each effect missing once.
 fn scenes() -> Vec<(&'static str, Value)> {
-    let fabric: Value = serde_json::from_str(include_str!("../cases/fabrics/px35.json")).unwrap();
-    let cell = json!({
-        "title": "coarse cell",
-        "fabric": fabric,
-        "domain": { "cell": {} },
-        "resolution": { "warp_columns": 6, "weft_columns": 4, "slice_mm": 0.8, "beams_per_lap": 32 },
-        "steps": [{ "pretension": { "time_s": 1.5e-4 } }, { "shear": { "angle_deg": 3, "time_s": 1e-4 } }],
-        "effects": {}
-    });
-    let specimen = with(
-        cell.clone(),
-        &[
-            ("/domain", json!({ "specimen": { "length_mm": 20, "width_mm": 14, "displacement_mm": 0.01 } })),
-            ("/steps", json!([{ "pretension": { "time_s": 1.5e-4 } }, { "move": { "time_s": 1e-4 } }])),
-        ],
-    );
+    let (cell, specimen) = (coarse_cell(), held_specimen());
     let held = json!({ "within": [[-0.1, -0.1, -0.1], [0.1, 1.1, 1.1]], "displacement_mm": [0, 0, 0] });
     let thread = json!({
         "name": "thread", "nodes": [[0, 0, 2], [1, 0, 2], [2, 0.2, 2], [3, 0, 2]], "radius_mm": 0.1,

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{advance, bare, below, block, charmetant, loaded, neo_hookean, with};
+use common::{advance, bare, below, block, charmetant, coarse_cell, loaded, neo_hookean, with};
 use serde_json::{Value, json};
 use tricot::backend::Backend;
 use tricot::backend::cpu::{Cpu, Precision as Run};
@@ -18,15 +18,8 @@ use tricot::run::simulation;
 use tricot::simulate::{Make, Simulation};
 
 fn cell() -> Value {
-    let fabric: Value = serde_json::from_str(include_str!("../cases/fabrics/px35.json")).unwrap();
-    json!({
-        "title": "coarse cell",
-        "fabric": fabric,
-        "domain": { "cell": {} },
-        "resolution": { "warp_columns": 6, "weft_columns": 4, "slice_mm": 0.8, "beams_per_lap": 32 },
-        "steps": [{ "pretension": { "time_s": 1e-4 } }, { "shear": { "angle_deg": 10, "time_s": 1e-4 } }],
-        "integration": { "energy_tolerance": 100 }
-    })
+    let steps = json!([{ "pretension": { "time_s": 1e-4 } }, { "shear": { "angle_deg": 10, "time_s": 1e-4 } }]);
+    with(coarse_cell(), &[("/steps", steps)])
 }
 
 /// Two blocks and a thread that overlap a little, pulled along.

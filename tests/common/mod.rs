@@ -53,6 +53,32 @@ pub fn bare() -> Value {
     })
 }
 
+/// A coarse cell of the shipped fabric with every effect, tightened fast so that threads and yarns touch.
+pub fn coarse_cell() -> Value {
+    let fabric: Value = serde_json::from_str(include_str!("../../cases/fabrics/px35.json")).unwrap();
+    json!({
+        "title": "coarse cell",
+        "fabric": fabric,
+        "domain": { "cell": {} },
+        "resolution": { "warp_columns": 6, "weft_columns": 4, "slice_mm": 0.8, "beams_per_lap": 32 },
+        "steps": [{ "pretension": { "time_s": 1.5e-4 } }, { "shear": { "angle_deg": 3, "time_s": 1e-4 } }],
+        "integration": { "energy_tolerance": 100 },
+        "effects": {}
+    })
+}
+
+/// A small specimen with threads held at its cuts, tightened fast.
+pub fn held_specimen() -> Value {
+    let domain = json!({ "specimen": { "length_mm": 20, "width_mm": 14, "displacement_mm": 0.01 } });
+    with(
+        coarse_cell(),
+        &[
+            ("/domain", domain),
+            ("/steps", json!([{ "pretension": { "time_s": 1.5e-4 } }, { "move": { "time_s": 1e-4 } }])),
+        ],
+    )
+}
+
 /// Replaces or adds values at paths such as `/effects/mass_floor`.
 pub fn with(mut value: Value, changes: &[(&str, Value)]) -> Value {
     for (path, new) in changes {

@@ -33,7 +33,7 @@ const ROWS: u64 = 512;
 /// Bytes from one row to the next: the largest alignment of offsets that adapters ask for.
 const ROW_STRIDE: u64 = 256;
 /// Calls of a list of stages between two that are timed.
-const TIMED_EVERY: u64 = 61;
+const TIMED_EVERY: u64 = 7;
 /// Stages of a timed call at most.
 const TIMED_STAGES: u32 = 64;
 
@@ -71,6 +71,7 @@ struct Clock {
 /// Time of a stage.
 struct Time {
     stage: &'static str,
+    calls: u64,
     runs: u64,
     timed: u64,
     timed_s: f64,
@@ -290,15 +291,15 @@ impl Backend for Gpu {
             let offsets: Vec<u32> = (0..rows.len() as u64).map(|i| (first + i * ROW_STRIDE) as u32).collect();
             let mut timed = false;
             for stage in stages.iter().filter(|s| s.count > 0) {
-                match work.times.iter_mut().find(|t| t.stage == stage.name) {
-                    Some(time) => {
-                        timed |= time.runs / TIMED_EVERY != (time.runs + rows.len() as u64) / TIMED_EVERY;
-                        time.runs += rows.len() as u64;
-                    }
-                    None => {
-                        work.times.push(Time { stage: stage.name, runs: rows.len() as u64, timed: 0, timed_s: 0.0 });
-                    }
+                let known = work.times.iter().position(|t| t.stage == stage.name);
+                let place = known.unwrap_or(work.times.len());
+                if known.is_none() {
+                    work.times.push(Time { stage: stage.name, calls: 0, runs: 0, timed: 0, timed_s: 0.0 });
                 }
+                let time = &mut work.times[place];
+                timed |= time.calls.is_multiple_of(TIMED_EVERY);
+                time.calls += 1;
+                time.runs += rows.len() as u64;
             }
             let last = if timed { offsets.len() - 1 } else { offsets.len() };
             self.record(&mut work, stages, &offsets[..last], false);
