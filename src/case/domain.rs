@@ -25,6 +25,18 @@ pub enum Domain {
     Mesh(InlineMesh),
 }
 
+impl Domain {
+    /// Largest displacement that is prescribed, mm.
+    pub fn reach_mm(&self) -> f64 {
+        let size = |d: &[f64; 3]| libm::sqrt(d.iter().map(|c| c * c).sum());
+        match self {
+            Self::Cell { .. } => 0.0,
+            Self::Specimen(specimen) => specimen.displacement_mm,
+            Self::Mesh(inline) => inline.conditions.iter().map(|c| size(&c.displacement_mm)).fold(0.0, f64::max),
+        }
+    }
+}
+
 fn warps() -> usize {
     2
 }

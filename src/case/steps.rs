@@ -125,6 +125,9 @@ pub struct Output {
     /// Shear angles at which a frame (VTU) is written, degrees. A frame is also written at the start and at the end of every load step.
     #[schemars(length(max = 1000), inner(range(min = -80, max = 80)))]
     pub frames_at_deg: Vec<f64>,
+    /// Displacements of a `move` at which a frame is written, mm, in the same way. Default none.
+    #[schemars(length(max = 1000), inner(range(min = 0, max = 512)))]
+    pub frames_at_mm: Vec<f64>,
     /// Frames per load step besides. Default 0.
     #[schemars(range(min = 0, max = 10_000))]
     pub frames_per_step: usize,
@@ -141,6 +144,7 @@ impl Default for Output {
         Self {
             rows_per_step: 200,
             frames_at_deg: vec![25.0],
+            frames_at_mm: Vec::new(),
             frames_per_step: 0,
             pictures: true,
             checkpoint_wall_s: Some(300.0),

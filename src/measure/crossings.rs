@@ -120,6 +120,34 @@ impl Crossings {
         };
         Ok(self.pairs.iter().map(crossing).collect())
     }
+
+    /// A value of the crossings on every hexahedron, blocks in order: linear along each yarn between its crossings, the nearest
+    /// one's beyond them, NaN on yarns without any.
+    pub fn along_yarns(&self, mesh: &Mesh, crossings: &[Crossing], value: impl Fn(&Crossing) -> f64) -> Vec<f64> {
+        let mut values = Vec::with_capacity(mesh.hexes());
+        for (number, block) in mesh.blocks.iter().enumerate() {
+            let mut own: Vec<[f64; 2]> = Vec::new();
+            for (pair, crossing) in self.pairs.iter().zip(crossings) {
+                let sides = [(pair.warp, pair.at[0]), (pair.weft, pair.at[1])];
+                own.extend(sides.iter().filter(|(b, _)| *b == number).map(|(_, at)| [*at, value(crossing)]));
+            }
+            own.retain(|[_, v]| v.is_finite());
+            own.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            let slices: Vec<f64> = (0..block.slices).map(|s| between(&own, s as f64 + 0.5)).collect();
+            (0..block.columns * block.layers).for_each(|_| values.extend(&slices));
+        }
+        values
+    }
+}
+
+/// Value at a place among (place, value) in rising order: linear between two, constant beyond the first and last.
+fn between(points: &[[f64; 2]], at: f64) -> f64 {
+    let after = points.partition_point(|p| p[0] < at);
+    match (after.checked_sub(1).and_then(|i| points.get(i)), points.get(after)) {
+        (Some(a), Some(b)) => a[1] + (b[1] - a[1]) * (at - a[0]) / (b[0] - a[0]),
+        (Some(only), None) | (None, Some(only)) => only[1],
+        (None, None) => f64::NAN,
+    }
 }
 
 impl Crossing {
@@ -330,6 +358,19 @@ mod tests {
             assert!((c.slipped() - 0.5).abs() < 1e-12 && (c.angle - 0.5).abs() < 1e-12);
             assert!((c.slip[0] - 0.3).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn values_go_linearly_from_crossing_to_crossing_along_each_yarn() {
+        let mesh = sample::plies();
+        let crossings = measured(trellis(0.2), |_, _| {});
+        let all = Crossings::of(&mesh, [1.0, 1.0]);
+        let same = all.along_yarns(&mesh, &crossings, |c| c.angle);
+        assert_eq!(same.len(), mesh.hexes());
+        assert!(same.iter().all(|a| (a - 0.2).abs() < 1e-12));
+        let points = [[1.0, 3.0], [3.0, 7.0]];
+        assert_eq!([0.0, 1.0, 1.5, 3.0, 9.0].map(|at| between(&points, at)), [3.0, 3.0, 4.0, 7.0, 7.0]);
+        assert!(between(&[], 1.0).is_nan());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Tension of the stitch: how hard its loops and underlaps pull, and which share of it is slack.
 
 use crate::error::{Error, Result};
-use crate::mesh::{Mesh, Part};
+use crate::mesh::{Mesh, Part, Thread};
 
 /// Axial force below which a beam counts as slack, N.
 pub const SLACK_BELOW_N: f64 = 0.02;
@@ -31,25 +31,86 @@ pub struct Stitches {
     pub underlaps: Tension,
 }
 
-/// Tensions from the axial force of every beam, N, threads in order.
-pub fn measure(mesh: &Mesh, forces: &[f64]) -> Result<Stitches> {
+/// A loop or an underlap: neighbouring beams of one part of a lap.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Leg {
+    pub part: Part,
+    /// Middle between its ends and the way from one to the other in the reference state, mm.
+    pub middle: [f64; 2],
+    pub chord: [f64; 2],
+    /// Mean axial force, weighted by reference length, N; compression is negative.
+    pub force_n: f64,
+}
+
+impl Leg {
+    /// Whether it carries: its mean force is not below [`SLACK_BELOW_N`].
+    pub fn taut(&self) -> bool {
+        self.force_n >= SLACK_BELOW_N
+    }
+}
+
+/// Loops and underlaps of all threads from the axial force of every beam, N. Where a closed thread begins within one, it counts
+/// as two.
+pub fn legs(mesh: &Mesh, forces: &[f64]) -> Result<Vec<Leg>> {
+    checked(mesh, forces)?;
+    let mut legs = Vec::new();
+    let mut first = 0;
+    for thread in &mesh.threads {
+        let part = |i: usize| thread.parts.get(i).copied().unwrap_or(Part::Free);
+        let mut start = 0;
+        for end in 1..=thread.beams() {
+            if end < thread.beams() && part(end) == part(start) {
+                continue;
+            }
+            let (mut length, mut sum) = (0.0, 0.0);
+            for i in start..end {
+                let own = beam_length(mesh, thread, i);
+                length += own;
+                sum += own * forces[first + i];
+            }
+            let [from, to] = [thread.beam(start)[0], thread.beam(end - 1)[1]].map(|seen| mesh.position(seen));
+            legs.push(Leg {
+                part: part(start),
+                middle: [0, 1].map(|k| 0.5 * (from[k] + to[k])),
+                chord: [0, 1].map(|k| to[k] - from[k]),
+                force_n: sum / length,
+            });
+            start = end;
+        }
+        first += thread.beams();
+    }
+    Ok(legs)
+}
+
+/// Reference length of a beam, mm.
+fn beam_length(mesh: &Mesh, thread: &Thread, beam: usize) -> f64 {
+    let [a, b] = thread.beam(beam).map(|seen| mesh.position(seen));
+    (0..3).map(|k| (b[k] - a[k]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// An error unless every beam has a force that is a number.
+fn checked(mesh: &Mesh, forces: &[f64]) -> Result<()> {
     if forces.len() != mesh.beams() {
         let message = format!("{} values where the mesh has {} beams", forces.len(), mesh.beams());
         return Err(Error::geometry("axial forces", message));
     }
+    let mut beams = mesh.threads.iter().flat_map(|t| (0..t.beams()).map(move |i| (t, i)));
+    match beams.nth(forces.iter().position(|f| f.is_nan()).unwrap_or(usize::MAX)) {
+        Some((thread, i)) => {
+            Err(Error::geometry(format!("thread {}, beam {i}", thread.name), "its axial force is not a number"))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Tensions from the axial force of every beam, N, threads in order.
+pub fn measure(mesh: &Mesh, forces: &[f64]) -> Result<Stitches> {
+    checked(mesh, forces)?;
     let mut samples = Vec::with_capacity(forces.len());
     let beams = mesh.threads.iter().flat_map(|t| (0..t.beams()).map(move |i| (t, i)));
     for ((thread, i), &force) in beams.zip(forces) {
-        if force.is_nan() {
-            return Err(Error::geometry(
-                format!("thread {}, beam {i}", thread.name),
-                "its axial force is not a number",
-            ));
-        }
-        let [a, b] = thread.beam(i).map(|seen| mesh.position(seen));
-        let length = (0..3).map(|k| (b[k] - a[k]).powi(2)).sum::<f64>().sqrt();
         let part = thread.parts.get(i).copied().unwrap_or(Part::Free);
-        samples.push((force, length, part));
+        samples.push((force, beam_length(mesh, thread, i), part));
     }
     samples.sort_by(|a, b| a.0.total_cmp(&b.0));
     let of = |wanted: Option<Part>| {
@@ -88,7 +149,6 @@ impl Tension {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::Thread;
 
     /// A closed thread of four beams with lengths 1, 2, 3 and 4 mm along x.
     fn mesh() -> Mesh {
@@ -123,6 +183,16 @@ mod tests {
         assert_eq!(s.all.slack_share, 0.5);
         assert_eq!((s.loops.length_mm, s.underlaps.length_mm), (3.0, 7.0));
         assert!((s.underlaps.slack_share - 3.0 / 7.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_leg_is_a_run_of_beams_of_one_part() {
+        let found = legs(&mesh(), &[0.4, -0.1, 0.01, 0.3]).unwrap();
+        assert_eq!(found.iter().map(|l| l.part).collect::<Vec<_>>(), [Part::Loop, Part::Underlap]);
+        assert_eq!((found[0].middle, found[0].chord), ([1.5, 0.0], [3.0, 0.0]));
+        assert!((found[0].force_n - 0.2 / 3.0).abs() < 1e-15 && found[0].taut());
+        assert!((found[1].force_n - 1.23 / 7.0).abs() < 1e-15);
+        assert!(!legs(&mesh(), &[0.0, 0.02, 0.0, 0.0]).unwrap()[0].taut());
     }
 
     #[test]

@@ -10,6 +10,8 @@ pub struct Frame {
     pub time: f64,
     /// Shear angle γ of the periodic cell, degrees.
     pub angle_deg: f64,
+    /// Largest prescribed displacement of a free scene, mm: the way of the clamp of a specimen.
+    pub displacement_mm: f64,
     /// Macroscopic deformation gradient F̄ (in-plane part, rows first); identity for free scenes.
     pub gradient: [[f64; 2]; 2],
     /// Current position of every node, mm.

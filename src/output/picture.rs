@@ -95,10 +95,14 @@ fn oblique() -> [[f32; 3]; 3] {
     [right, scene::cross(toward, right), toward]
 }
 
-/// Time, and angle where there is one.
+/// What is prescribed, and time.
 fn state(mesh: &Mesh, frame: &Frame) -> String {
     let time = format!("t = {:.2} ms", 1e3 * frame.time);
-    if mesh.period.is_some() { format!("γ = {:.1}°   {time}", frame.angle_deg) } else { time }
+    match (mesh.period, frame.displacement_mm) {
+        (Some(_), _) => format!("γ = {:.1}°   {time}", frame.angle_deg),
+        (None, 0.0) => time,
+        (None, way) => format!("d = {way:.2} mm   {time}"),
+    }
 }
 
 /// Extent of everything drawn in the first image, mm.

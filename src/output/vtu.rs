@@ -11,7 +11,8 @@
 //! the fibre direction of a yarn, the axis of a beam).
 //! A field of hexahedra and one of beams with the same name and size become one array. Where a field has no value, it is NaN.
 //!
-//! Field data hold `TimeValue` (s), `shear_angle_deg` and `macroscopic_gradient` (F̄, the in-plane part, rows first).
+//! Field data hold `TimeValue` (s), `shear_angle_deg`, `prescribed_displacement_mm` (the largest of a free scene) and
+//! `macroscopic_gradient` (F̄, the in-plane part, rows first).
 //! Positions are Float64, fields Float32, in binary blocks compressed by zlib.
 
 use super::file::replace;
@@ -132,6 +133,7 @@ impl Grid {
         for (name, values) in [
             ("TimeValue", &[frame.time][..]),
             ("shear_angle_deg", &[frame.angle_deg]),
+            ("prescribed_displacement_mm", &[frame.displacement_mm]),
             ("macroscopic_gradient", &gradient),
         ] {
             let values: Vec<String> = values.iter().map(|v| format!("{v:?}")).collect();

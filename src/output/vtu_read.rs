@@ -33,8 +33,8 @@ pub fn read(path: &Path, mesh: &Mesh) -> Result<Frame> {
         let values = info.iter().find(|a| a.name == name).and_then(Array::values);
         values.filter(|v| v.len() == count).ok_or_else(|| broken(name))
     };
-    let (time, angle, gradient) =
-        (numbers("TimeValue", 1)?, numbers("shear_angle_deg", 1)?, numbers("macroscopic_gradient", 4)?);
+    let [time, angle] = [numbers("TimeValue", 1)?[0], numbers("shear_angle_deg", 1)?[0]];
+    let gradient = numbers("macroscopic_gradient", 4)?;
     let points = arrays(&text, "Points").first().and_then(Array::values).ok_or_else(|| broken("Points"))?;
     let (nodes, hexes, beams) = (mesh.nodes.len(), mesh.hexes(), mesh.beams());
     let cells = text.find("<Piece").and_then(|i| attribute(&text[i..], "NumberOfCells"));
@@ -48,8 +48,10 @@ pub fn read(path: &Path, mesh: &Mesh) -> Result<Frame> {
         return Err(Error::file(path, message));
     }
     let mut frame = Frame {
-        time: time[0],
-        angle_deg: angle[0],
+        time,
+        angle_deg: angle,
+        // frames of earlier versions do not hold it
+        displacement_mm: numbers("prescribed_displacement_mm", 1).map_or(0.0, |d| d[0]),
         gradient: [[gradient[0], gradient[1]], [gradient[2], gradient[3]]],
         positions: points.chunks_exact(3).take(nodes).map(|p| [p[0], p[1], p[2]]).collect(),
         ..Frame::default()
@@ -184,6 +186,7 @@ mod tests {
             Field { name: name.into(), components, values }
         };
         frame.time = 1.0 / 3.0;
+        frame.displacement_mm = 2.5;
         frame.node_fields = vec![ramp("velocity", 3, mesh.nodes.len())];
         frame.hex_fields = vec![ramp("energy<", 1, mesh.hexes())];
         frame.beam_fields = vec![ramp("tension_n", 1, mesh.beams())];
@@ -199,8 +202,8 @@ mod tests {
         let again = read(&path, &mesh).unwrap();
         again.check(&mesh).unwrap();
         assert_eq!(
-            (again.time, again.angle_deg, again.gradient, &again.positions),
-            (frame.time, frame.angle_deg, frame.gradient, &frame.positions)
+            (again.time, again.angle_deg, again.displacement_mm, again.gradient, &again.positions),
+            (frame.time, frame.angle_deg, frame.displacement_mm, frame.gradient, &frame.positions)
         );
         for (old, new) in [
             (&frame.node_fields, &again.node_fields),

@@ -14,7 +14,12 @@ use std::path::Path;
 /// Diagonal of the cell towards which positive shear turns its yarns.
 const DIAGONAL: [f64; 2] = [1.0, 1.0];
 /// Means over a zone leave out what is closer to its border than this share of the width of the specimen.
-const MARGIN: f64 = 0.1;
+pub(super) const MARGIN: f64 = 0.1;
+
+/// The strip between the clamps of a specimen.
+pub(super) fn strip(specimen: &Specimen) -> Strip {
+    Strip { centre: [0.0; 2], axis: [1.0, 0.0], length: specimen.length_mm, width: specimen.width_mm }
+}
 
 /// The crossings of a scene with their files.
 pub(super) struct Crossed {
@@ -53,10 +58,7 @@ impl Crossed {
         table: impl Fn(&str, &[&str]) -> Result<Table>,
     ) -> Result<Option<Self>> {
         let specimen = match domain {
-            Domain::Specimen(s) => {
-                let strip = Strip { centre: [0.0; 2], axis: [1.0, 0.0], length: s.length_mm, width: s.width_mm };
-                Some((s, strip))
-            }
+            Domain::Specimen(s) => Some((s, strip(s))),
             _ => None,
         };
         let crossings = Crossings::of(mesh, specimen.as_ref().map_or(DIAGONAL, |(_, strip)| strip.axis));
@@ -93,20 +95,32 @@ impl Crossed {
         self.tables[0].numbers(&numbers)
     }
 
+    /// Every crossing of a frame, which gains the fields of hexahedra that follow from them.
+    pub(super) fn see(&self, mesh: &Mesh, frame: &mut Frame) -> Result<Vec<Crossing>> {
+        let yarns = yarns::measure(mesh, frame)?;
+        let crossings = self.crossings.measure(mesh, frame, &yarns)?;
+        let field = |name: &str, value: &dyn Fn(&Crossing) -> f64| {
+            let values = self.crossings.along_yarns(mesh, &crossings, value);
+            Field { name: name.into(), components: 1, values }
+        };
+        let fields =
+            [field("effective_angle_deg", &|c| c.angle.to_degrees()), field("ply_slip_mm", &Crossing::slipped)];
+        frame.hex_fields.extend(fields);
+        Ok(crossings)
+    }
+
     /// Every crossing: rows of the table, and a map in the folder of results.
     pub(super) fn write_frame(
         &mut self,
         mesh: &Mesh,
         frame: &Frame,
-        displacement: f64,
+        crossings: &[Crossing],
         dir: &Path,
         file: String,
     ) -> Result<()> {
-        let yarns = yarns::measure(mesh, frame)?;
-        let crossings = self.crossings.measure(mesh, frame, &yarns)?;
-        let angle = self.means(&crossings).map_or(frame.angle_deg, |means| means.angle[2].to_degrees());
-        for (i, (pair, c)) in self.crossings.pairs.iter().zip(&crossings).enumerate() {
-            let head = [frame.time, angle, displacement].map(Cell::from);
+        let angle = self.means(crossings).map_or(frame.angle_deg, |means| means.angle[2].to_degrees());
+        for (i, (pair, c)) in self.crossings.pairs.iter().zip(crossings).enumerate() {
+            let head = [frame.time, angle, frame.displacement_mm].map(Cell::from);
             let zone = self.zones.as_ref().map_or("none", |zones| zones.all[i].name());
             let names = [pair.warp, pair.weft].map(|block| mesh.blocks[block].name.as_str().into());
             let degrees = [c.angle, c.direction[0], c.direction[1]].map(f64::to_degrees);

@@ -3,6 +3,7 @@
 mod check;
 mod crossings;
 mod devices;
+mod findings;
 mod mesh;
 mod picture;
 mod pulled;
@@ -28,6 +29,7 @@ use crate::measure::yarns;
 use crate::mesh::{Mesh, Ply};
 use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH};
 use crate::output::{directory, file, vtu};
+use crate::schedule::Load;
 use crate::simulate::{Make, Simulation};
 use crossings::Crossed;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -176,8 +178,6 @@ struct Run<'a> {
     pictures: Vec<String>,
     /// Shear angle, degrees, and F_nor, N/mm, at the rows of shear of a cell.
     curve: Vec<(f64, f64)>,
-    /// Largest prescribed displacement, mm.
-    reach: f64,
     /// Shear angle (rad) and external work (mJ) of a cell at the last row.
     last_shear: [f64; 2],
     /// Mean width, thickness and gap of warp and weft before shear, mm.
@@ -194,22 +194,12 @@ struct Run<'a> {
     started: Instant,
 }
 
-/// How far a run has come: complete load steps, complete rows of the next one, and frames at angles in it.
+/// How far a run has come: complete load steps, complete rows of the next one, and frames at angles or displacements in it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Place {
     phase: usize,
     row: usize,
-    angles: usize,
-}
-
-/// Largest displacement that a domain prescribes, mm.
-fn reach(domain: &Domain) -> f64 {
-    let size = |d: &[f64; 3]| libm::sqrt(d.iter().map(|c| c * c).sum());
-    match domain {
-        Domain::Cell { .. } => 0.0,
-        Domain::Specimen(specimen) => specimen.displacement_mm,
-        Domain::Mesh(inline) => inline.conditions.iter().map(|c| size(&c.displacement_mm)).fold(0.0, f64::max),
-    }
+    marks: usize,
 }
 
 impl<'a> Run<'a> {
@@ -247,7 +237,6 @@ impl<'a> Run<'a> {
             frames: Vec::new(),
             pictures: Vec::new(),
             curve: Vec::new(),
-            reach: reach(&loaded.case.domain),
             last_shear: [0.0; 2],
             settled: None,
             worst_balance: 0.0,
@@ -273,24 +262,26 @@ impl<'a> Run<'a> {
         }
         self.wait();
         for (number, (phase, step)) in phases.iter().zip(&self.loaded.case.steps).enumerate().skip(self.place.phase) {
-            let mut angles = match step {
-                Step::Shear { .. } => output.frames_at_deg.clone(),
-                _ => Vec::new(),
+            let (mut marks, unit, reach) = match step {
+                Step::Shear { .. } => (output.frames_at_deg.clone(), "deg", 1.0),
+                Step::Move { .. } => (output.frames_at_mm.clone(), "mm", self.loaded.case.domain.reach_mm()),
+                _ => (Vec::new(), "", 1.0),
             };
-            angles.sort_by(f64::total_cmp);
-            let [before, after] =
-                [phase.start, phase.end].map(|t| self.simulation.schedule.load(t).angle.to_degrees().abs());
-            angles.retain(|a| *a > before && *a < after);
+            // one of the two is zero throughout
+            let loaded = |load: Load| load.angle.to_degrees().abs() + load.motion * reach;
+            marks.sort_by(f64::total_cmp);
+            let [before, after] = [phase.start, phase.end].map(|t| loaded(self.simulation.schedule.load(t)));
+            marks.retain(|mark| *mark > before && *mark < after);
             let rows = output.rows_per_step.max(1);
             for row in self.place.row + 1..=rows {
                 let until = phase.start + (phase.end - phase.start) * row as f64 / rows as f64;
                 let arrived = self.reach(until)?;
                 self.write_row(phase.name)?;
                 self.tell(&bar, phase.name);
-                let angle = self.simulation.load().angle.to_degrees().abs();
-                while angles.get(self.place.angles).is_some_and(|a| angle >= *a) {
-                    self.write_frame(&format!("{:.0}deg", angles[self.place.angles]))?;
-                    self.place.angles += 1;
+                let now = loaded(self.simulation.load());
+                while marks.get(self.place.marks).is_some_and(|mark| now >= *mark) {
+                    self.write_frame(&format!("{}{unit}", marks[self.place.marks]))?;
+                    self.place.marks += 1;
                 }
                 if output.frames_per_step > 0
                     && row < rows
@@ -364,7 +355,7 @@ impl<'a> Run<'a> {
         let load = s.load();
         let loaded = match s.mesh.period {
             Some(_) => format!("γ {:.1}°", load.angle.to_degrees()),
-            None => format!("d {:.2} mm", load.motion * self.reach),
+            None => format!("d {:.2} mm", s.displacement()),
         };
         bar.set_message(format!(
             "{phase} {loaded} step {} dt {:.2e} s, internal {:.3e} mJ, kinetic {:.1e} mJ, balance {:+.2} %",
@@ -379,16 +370,17 @@ impl<'a> Run<'a> {
     /// A frame for ParaView, and a picture of it.
     fn write_frame(&mut self, name: &str) -> Result<()> {
         let s = &self.simulation;
-        let frame = s.frame();
+        let mut frame = s.frame();
         s.alive()?;
         let dir = &self.options.output;
+        let crossings = self.crossings.as_ref().map(|c| c.see(&s.mesh, &mut frame)).transpose()?;
         let file = format!("frames/{:04}-{name}.vtu", self.frames.len());
         vtu::write(&s.mesh, &frame, &dir.join(&file))?;
         self.frames.push((frame.time, file));
         vtu::write_collection(&dir.join("run.pvd"), &self.frames)?;
-        if let Some(crossings) = &mut self.crossings {
+        if let (Some(crossed), Some(crossings)) = (&mut self.crossings, crossings) {
             let map = format!("frames/{:04}-{name}.vtp", self.frames.len() - 1);
-            crossings.write_frame(&s.mesh, &frame, s.load().motion * self.reach, dir, map)?;
+            crossed.write_frame(&s.mesh, &frame, &crossings, dir, map)?;
         }
         if self.loaded.case.output.pictures {
             let file = format!("{:04}-{name}.png", self.frames.len() - 1);

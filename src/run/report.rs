@@ -51,6 +51,11 @@ pub fn report(dir: &Path, out: &Path) -> Result<String> {
     results.sizes(&mut page)?;
     results.curves(&mut page)?;
     results.zones(&mut page)?;
+    let found = if results.is_specimen() { results.findings()? } else { Vec::new() };
+    if !found.is_empty() {
+        page.heading("What the pull shows");
+        page.list("findings", &found);
+    }
     results.crossings(&mut page)?;
     results.table(&mut page);
     if let Some((_, before @ [_, ..])) = pictures.split_last() {
@@ -62,16 +67,18 @@ pub fn report(dir: &Path, out: &Path) -> Result<String> {
     results.case(&mut page);
     let text = page.finish(&title);
     file::replace(out, |w| w.write_all(text.as_bytes()))?;
-    Ok(format!("{} written, {:.1} MB", out.display(), text.len() as f64 / 1e6))
+    let mut lines = vec![format!("{} written, {:.1} MB", out.display(), text.len() as f64 / 1e6)];
+    lines.extend(found);
+    Ok(lines.join("\n"))
 }
 
 /// The files of a run.
-struct Results<'a> {
-    dir: &'a Path,
-    history: Columns,
+pub(super) struct Results<'a> {
+    pub(super) dir: &'a Path,
+    pub(super) history: Columns,
     /// Null while the run goes on.
     summary: Value,
-    case: Value,
+    pub(super) case: Value,
 }
 
 /// What curves are drawn over.
@@ -101,7 +108,7 @@ impl Results<'_> {
     }
 
     /// Another table of the run, if it has one.
-    fn other(&self, name: &str) -> Result<Option<Columns>> {
+    pub(super) fn other(&self, name: &str) -> Result<Option<Columns>> {
         let path = self.dir.join(name);
         path.is_file().then(|| Columns::read(&path)).transpose()
     }

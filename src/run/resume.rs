@@ -72,8 +72,8 @@ fn value(case: &Case) -> Result<Value> {
 
 impl Recorded for Place {
     fn record(&mut self, record: &mut Record) {
-        let Self { phase, row, angles } = self;
-        [phase, row, angles].into_iter().for_each(|n| n.record(record));
+        let Self { phase, row, marks } = self;
+        [phase, row, marks].into_iter().for_each(|n| n.record(record));
     }
 }
 
@@ -121,7 +121,7 @@ impl Run<'_> {
             Start::From(phases) => {
                 self.place.phase = phases;
                 self.last_shear = [self.simulation.load().angle, self.simulation.energies().external];
-                let displacement = self.simulation.load().motion * self.reach;
+                let displacement = self.simulation.displacement();
                 if self.pulled.is_some() {
                     let (_, crossings) = self.see()?;
                     let zones = self.crossings.as_ref().and_then(|c| c.means(&crossings));

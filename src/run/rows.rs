@@ -40,7 +40,7 @@ impl Run<'_> {
     /// One row in every table.
     pub(super) fn write_row(&mut self, phase: &str) -> Result<()> {
         let (yarns, crossings) = self.see()?;
-        let displacement = self.simulation.load().motion * self.reach;
+        let displacement = self.simulation.displacement();
         let loading = self.loading(&crossings, displacement, phase);
         let Loading { degrees, theory, .. } = loading;
         self.simulation.alive()?;

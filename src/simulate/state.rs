@@ -65,6 +65,11 @@ impl Simulation {
             .map_or_else(Vec::new, |b| self.backend.scalars(b).chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect())
     }
 
+    /// Largest prescribed displacement now, mm.
+    pub fn displacement(&self) -> f64 {
+        self.load().motion * self.case.domain.reach_mm()
+    }
+
     /// The deformed state, with the fields that pictures and ParaView show.
     pub fn frame(&self) -> Frame {
         let gradient = self.schedule.row(self.time, 1.0, 1.0).gradient;
@@ -79,6 +84,7 @@ impl Simulation {
         let mut frame = Frame {
             time: self.time,
             angle_deg: self.load().angle.to_degrees(),
+            displacement_mm: self.displacement(),
             gradient: f,
             positions,
             ..Frame::default()
