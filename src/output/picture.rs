@@ -21,6 +21,9 @@ pub const WIDTHS: RangeInclusive<usize> = 300..=6000;
 /// Samples per pixel and direction.
 const FINER: usize = 2;
 
+/// Size of the title over that of other letters, unless it takes the room of what stands beside it.
+const TITLE: f32 = 1.5;
+
 /// What to show.
 #[derive(Debug, Clone)]
 pub struct View {
@@ -53,10 +56,11 @@ pub fn render(mesh: &Mesh, frame: &Frame, view: &View) -> Result<Image> {
     let sheet = Sheet::of(view, &stage);
     let mut image = Image::new(view.width_px, sheet.height(), colour::background());
     let right = image.width as f32 - sheet.margin;
-    sheet.line(&mut image, sheet.margin, 0.45 * sheet.margin, 1.5, &view.title);
     let state = state(mesh, frame);
-    let top = 0.45 * sheet.margin + 0.5 * sheet.letters;
-    sheet.line(&mut image, right - text::width(&state, sheet.letters), top, 1.0, &state);
+    let beside = right - text::width(&state, sheet.letters);
+    let room = (beside - 2.0 * sheet.margin) / text::width(&view.title, sheet.letters);
+    sheet.line(&mut image, sheet.margin, 0.45 * sheet.margin, TITLE.min(room), &view.title);
+    sheet.line(&mut image, beside, 0.45 * sheet.margin + 0.5 * sheet.letters, 1.0, &state);
 
     let scale = sheet.panel[0] as f32 / stage.size()[0];
     for (k, (axes, caption)) in FACES.into_iter().enumerate() {

@@ -93,14 +93,14 @@ impl Results<'_> {
     }
 }
 
-/// How many legs are taut, in all and by kind.
+/// How many legs there are, their mean tension and which share of them is taut, by kind.
 fn carried(legs: &[&Leg]) -> String {
     let share = |name: &str, own: &dyn Fn(&Leg) -> bool| {
         let own: Vec<_> = legs.iter().filter(|l| own(l)).collect();
-        let taut = own.iter().filter(|l| l.taut()).count();
-        let pushed = own.iter().filter(|l| l.force_n < 0.0).count();
-        let of = |n: usize| 100.0 * n as f64 / own.len() as f64;
-        format!("{name} {:.0} % taut, {:.0} % compressed (of {})", of(taut), of(pushed), own.len())
+        let share = |count: usize| 100.0 * count as f64 / own.len() as f64;
+        let mean = own.iter().map(|l| l.force_n).sum::<f64>() / own.len() as f64;
+        let taut = share(own.iter().filter(|l| l.taut()).count());
+        format!("{} {name} {mean:.3} N, {taut:.0} % taut", own.len())
     };
     let along = |l: &Leg| l.chord[0].abs() > l.chord[1].abs();
     [
@@ -109,7 +109,7 @@ fn carried(legs: &[&Leg]) -> String {
         share("underlaps across it", &|l| l.part == Part::Underlap && !along(l)),
     ]
     .join("; ")
-        + &format!("; taut from {SLACK_BELOW_N} N")
+        + &format!(" (from {SLACK_BELOW_N} N)")
 }
 
 /// Direction of the fibres of a ply in the plane.
