@@ -3,6 +3,7 @@
 mod check;
 mod crossings;
 mod devices;
+pub mod effects;
 mod mesh;
 mod picture;
 mod pulled;
@@ -10,6 +11,7 @@ mod report;
 mod resume;
 mod rows;
 mod summary;
+pub mod turns;
 
 pub use check::check;
 pub use devices::devices;
@@ -26,6 +28,7 @@ use crate::error::{Error, Result};
 use crate::fabric;
 use crate::measure::yarns;
 use crate::mesh::{Mesh, Ply};
+use crate::output::checkpoint::Checkpoint;
 use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH};
 use crate::output::{directory, file, vtu};
 use crate::simulate::{Make, Simulation};
@@ -122,6 +125,17 @@ fn write_case(case: &Case, dir: &Path) -> Result<()> {
 pub fn simulation(loaded: &Loaded, make: Make) -> Result<Simulation> {
     let (mesh, friction) = scene(loaded)?;
     Simulation::new(&loaded.case, friction, mesh, make)
+}
+
+/// A scene in the state that a run of the same case left in a checkpoint.
+///
+/// # Errors
+/// A file that cannot be read, or the state of another scene.
+pub fn simulation_at(loaded: &Loaded, make: Make, state: &Path) -> Result<Simulation> {
+    let mut simulation = simulation(loaded, make)?;
+    let Checkpoint { header, records: [host, _], buffers } = Checkpoint::read(state)?;
+    simulation.restore(host, &header.buffers, &buffers).map_err(|e| Error::file(state, e))?;
+    Ok(simulation)
 }
 
 /// Runs a case.
