@@ -49,7 +49,7 @@
 //! | [`output`] | frames, tables, maps, pictures, pages, checkpoints |
 //! | [`simulate`] | a scene in time: steps, contact searches, energies, guards |
 //! | [`run`] | a case with its files: what the program calls |
-//! | [`study`] | many cases at once: tables over a folder of scenes |
+//! | [`study`] | many runs at once: tables over a folder of scenes, how results differ |
 //!
 //! Imports point one way: a module knows only those before it in this list (`tests/structure.rs` checks it).
 //! ```text

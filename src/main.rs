@@ -9,6 +9,7 @@ use tricot::case::{schema, steps};
 use tricot::error::{Error, Result};
 use tricot::output::directory;
 use tricot::run;
+use tricot::study::compare::compare;
 use tricot::study::stability::stability;
 
 const UNEXPECTED: u8 = 1;
@@ -31,6 +32,7 @@ Examples:
   tricot run cases/unit_cell_shear.json -o results/cell --resume
   tricot picture results/cell
   tricot report results/cell
+  tricot compare results/cell results/other_way
   tricot study stability cases/hard
   tricot schema > case.schema.json
 
@@ -110,6 +112,21 @@ enum Command {
         /// The page [default: report.html in the folder]
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
+    },
+    /// Say how the results of a run differ from those of another: curves, numbers, and what was run.
+    Compare {
+        /// Folder of a run
+        #[arg(value_name = "A")]
+        a: PathBuf,
+        /// Folder of the run that differences are relative to
+        #[arg(value_name = "B")]
+        b: PathBuf,
+        /// Also write the numbers to a table
+        #[arg(short, long, value_name = "FILE")]
+        output: Option<PathBuf>,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
     },
     /// Run many cases and put them into one table.
     Study {
@@ -258,6 +275,11 @@ fn perform(command: Command) -> Result<Done> {
         Command::Report { source, output } => {
             let out = output.unwrap_or_else(|| source.join("report.html"));
             run::report(&source, &out)?
+        }
+        Command::Compare { a, b, output, json } => {
+            let comparison = compare(&a, &b)?;
+            output.map_or(Ok(()), |path| comparison.write(&path))?;
+            if json { format!("{:#}", comparison.json()) } else { comparison.text() }
         }
         Command::Study { study: StudyCommand::Stability { folder, backend, output } } => {
             let study = stability(&folder, backend.into(), &output)?;

@@ -45,7 +45,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// The case in a folder of results, with every default written out.
-const CASE: &str = "case.json";
+pub const CASE: &str = "case.json";
 
 /// What the command line says about a run, beyond the case.
 #[derive(Debug, Clone)]
