@@ -34,7 +34,7 @@ pub fn ratio(scene: &mut Simulation, beside: &mut Simulation, steps: u64, rounds
     let mut ratios = Vec::with_capacity(rounds);
     // the first round warms up
     for round in 0..=rounds {
-        let mut pair = [&mut *scene, &mut *beside];
+        let pair = [&mut *scene, &mut *beside];
         let mut times = [0.0; 2];
         let mut stopped = false;
         for place in if round % 2 == 0 { [0, 1] } else { [1, 0] } {
