@@ -13,6 +13,7 @@ use tricot::case::read::read;
 use tricot::error::Result;
 use tricot::run::simulation;
 use tricot::simulate::Make;
+use tricot::study::difference::{averaged, mean, relative_rms, spread};
 
 const VARIANTS: &[(&str, &[&str])] = &[
     ("reference", &[]),
@@ -36,7 +37,7 @@ const VARIANTS: &[(&str, &[&str])] = &[
 
 /// A shear curve: angle (degrees, positive) and F_nor (N/mm), and what it took.
 struct Curve {
-    points: Vec<(f64, f64)>,
+    points: Vec<[f64; 2]>,
     wall: f64,
     steps: u64,
     balance: f64,
@@ -59,7 +60,7 @@ fn curve(case: &Path, sets: &[&str], quanta: i32) -> Result<Curve> {
         simulation.advance(start + (end - start) * f64::from(row) / 400.0, |_| false)?;
         let now = [simulation.load().angle, simulation.energies().external];
         let turned = libm::sin(now[0].abs()) - libm::sin(last[0].abs());
-        points.push((0.5 * (now[0] + last[0]).abs().to_degrees(), (now[1] - last[1]) / (x * y * turned)));
+        points.push([0.5 * (now[0] + last[0]).abs().to_degrees(), (now[1] - last[1]) / (x * y * turned)]);
         balance = balance.max(simulation.health().balance.abs());
         last = now;
     }
@@ -68,19 +69,7 @@ fn curve(case: &Path, sets: &[&str], quanta: i32) -> Result<Curve> {
 
 /// Mean of F_nor over ±2° at 5, 6, … 45°.
 fn smooth(curve: &Curve) -> Vec<f64> {
-    (5..=45)
-        .map(|angle| {
-            let near = curve.points.iter().filter(|(a, _)| (a - f64::from(angle)).abs() <= 2.0);
-            let (sum, count) = near.fold((0.0, 0.0), |(s, n), (_, f)| (s + f, n + 1.0));
-            sum / count
-        })
-        .collect()
-}
-
-/// Root mean square of the relative difference, per cent.
-fn rms(a: &[f64], b: &[f64]) -> f64 {
-    let squares: f64 = a.iter().zip(b).map(|(a, b)| (a / b - 1.0) * (a / b - 1.0)).sum();
-    100.0 * libm::sqrt(squares / a.len() as f64)
+    averaged(&curve.points, &(5..=45).map(f64::from).collect::<Vec<_>>(), 2.0)
 }
 
 fn main() {
@@ -124,17 +113,15 @@ fn main() {
             continue;
         }
         let smoothed: Vec<Vec<f64>> = done.iter().map(|c| smooth(c)).collect();
-        let mean: Vec<f64> = (0..smoothed[0].len())
-            .map(|i| smoothed.iter().map(|s| s[i]).sum::<f64>() / smoothed.len() as f64)
-            .collect();
+        let mean = mean(&smoothed);
         if v == 0 {
             reference.clone_from(&mean);
         }
-        let spread = libm::sqrt(smoothed.iter().map(|s| rms(s, &mean).powi(2)).sum::<f64>() / smoothed.len() as f64);
+        let spread = 100.0 * spread(&smoothed, relative_rms);
         let forces: Vec<String> = [0, 10, 20, 30, 40].iter().map(|i| format!("{:.4}", mean[*i])).collect();
         println!(
             "{name:<24} {:>10.2} {spread:>10.2} {:>8.2}% {:>8} {:>9.0}  {}",
-            rms(&mean, &reference),
+            100.0 * relative_rms(&mean, &reference),
             100.0 * done.iter().map(|c| c.balance).fold(0.0, f64::max),
             done[0].steps,
             done.iter().map(|c| c.wall).sum::<f64>() / done.len() as f64,

@@ -9,6 +9,8 @@ use tricot::case::{schema, steps};
 use tricot::error::{Error, Result};
 use tricot::output::directory;
 use tricot::run;
+use tricot::study::compare::compare;
+use tricot::study::effects::{self, effects};
 use tricot::study::stability::stability;
 
 const UNEXPECTED: u8 = 1;
@@ -31,7 +33,9 @@ Examples:
   tricot run cases/unit_cell_shear.json -o results/cell --resume
   tricot picture results/cell
   tricot report results/cell
+  tricot compare results/cell results/other_way
   tricot study stability cases/hard
+  tricot study effects cases/unit_cell_shear.json --only friction --set steps.2.shear.angle_deg=10
   tricot schema > case.schema.json
 
 Exit codes:
@@ -90,7 +94,7 @@ enum Command {
     Check {
         #[command(flatten)]
         case: CaseArguments,
-        /// Also print the defaults in use and every stage of the algorithm for this case
+        /// Also print what called for each effect and what it costs, every stage of the algorithm, and the defaults in use
         #[arg(long)]
         explain: bool,
     },
@@ -110,6 +114,21 @@ enum Command {
         /// The page [default: report.html in the folder]
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
+    },
+    /// Say how the results of a run differ from those of another: curves, numbers, and what was run.
+    Compare {
+        /// Folder of a run
+        #[arg(value_name = "A")]
+        a: PathBuf,
+        /// Folder of the run that differences are relative to
+        #[arg(value_name = "B")]
+        b: PathBuf,
+        /// Also write the numbers to a table
+        #[arg(short, long, value_name = "FILE")]
+        output: Option<PathBuf>,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
     },
     /// Run many cases and put them into one table.
     Study {
@@ -146,6 +165,29 @@ enum StudyCommand {
         /// The table
         #[arg(short, long, value_name = "FILE", default_value = "results/stability.csv")]
         output: PathBuf,
+    },
+    /// Turn each effect of a case off in turn: what it costs, and what it changes.
+    Effects {
+        #[command(flatten)]
+        case: CaseArguments,
+        /// Turn off only this effect, by its name in `tricot check CASE`; may be repeated
+        #[arg(long, value_name = "EFFECT")]
+        only: Vec<String>,
+        /// Scalar type, instead of what the case says
+        #[arg(long)]
+        precision: Option<Scalar>,
+        /// Number of threads [default: all cores]
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+        threads: Option<u16>,
+        /// What runs the scenes
+        #[arg(long, default_value = "auto")]
+        backend: Machine,
+        /// The table [default: results/<name of the case>-effects.csv]; the runs go into the folder of this name without suffix
+        #[arg(short, long, value_name = "FILE")]
+        output: Option<PathBuf>,
+        /// Use a folder that holds runs: each is moved aside
+        #[arg(long)]
+        force: bool,
     },
 }
 
@@ -259,9 +301,25 @@ fn perform(command: Command) -> Result<Done> {
             let out = output.unwrap_or_else(|| source.join("report.html"));
             run::report(&source, &out)?
         }
+        Command::Compare { a, b, output, json } => {
+            let comparison = compare(&a, &b)?;
+            output.map_or(Ok(()), |path| comparison.write(&path))?;
+            if json { format!("{:#}", comparison.json()) } else { comparison.text() }
+        }
         Command::Study { study: StudyCommand::Stability { folder, backend, output } } => {
             let study = stability(&folder, backend.into(), &output)?;
             return Ok(Done { text: study.text, code: if study.held { 0 } else { UNEXPECTED } });
+        }
+        Command::Study { study: StudyCommand::Effects { case, only, precision, threads, backend, output, force } } => {
+            let loaded = case.read()?;
+            let table = output.unwrap_or_else(|| {
+                let mut name = directory::default(&case.case).into_os_string();
+                name.push("-effects.csv");
+                name.into()
+            });
+            let precision = precision.map_or(loaded.case.integration.precision, Into::into);
+            let make = run::make(precision, backend.into(), threads.map(usize::from), "")?;
+            effects(&loaded, &effects::Options { make, only, table, force })?
         }
         Command::Picture { source, field, width, output } => {
             let out = output.unwrap_or_else(|| picture_path(&source));

@@ -302,7 +302,8 @@ impl Simulation {
         let travel = f64::from(f32::from_bits(status[status::TRAVEL]));
         let load = self.load();
         let affine = (load.angle - self.gradient_at_search.angle).abs() * AFFINE_REACH;
-        let skin = self.case.effects.contact.as_ref().map_or(f64::INFINITY, |c| c.skin_mm);
+        let contact = self.case.effects.contact.as_ref().filter(|_| self.model.active.searches());
+        let skin = contact.map_or(f64::INFINITY, |c| c.skin_mm);
         let mut left = SKIN_USED * skin - travel - affine;
         if left < 0.0 || load.radius > self.gradient_at_search.radius {
             self.search()?;

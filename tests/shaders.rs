@@ -87,7 +87,7 @@ fn parameters(file: &str) -> Vec<Field<&'static str>> {
         "elements/hex8" => fields!(elements::hex8::Params: nodes),
         "contact/grid" | "contact/candidates" | "contact/penalty" | "contact/threads" | "contact/tie" => fields!(
             contact::Params: period, cells, capacity, slots, beam_slots, slabs, origin, cell, skin, friction, tangential, damping,
-            force_quantum, stiffness_quantum, thread_radius, thread_thread, self_arc, depth
+            force_quantum, stiffness_quantum, thread_radius, thread_thread, self_arc, depth, state
         ),
         "conditions/prescribed" => fields!(conditions::prescribed::Params: first_thread, gravity),
         "dynamics/assemble" => fields!(

@@ -30,9 +30,15 @@ fn prescribed(item: u32) {
     let node = nodes[2u * item];
     let mask = nodes[2u * item + 1u];
     let plane = arrayLength(&mass);
+#if GRAVITY
     let gravity = vec3<f32>(params.gravity_x, params.gravity_y, params.gravity_z);
+#endif
+#if DAMPING
     let damping = select(row.damping_thread, row.damping_solid, node < params.first_thread);
     let keep_gain = factors(damping, row.dt_mid);
+#else
+    let keep_gain = vec2<f32>(1.0, row.dt_mid);
+#endif
     for (var k = 0u; k < 3u; k++) {
         if ((mask >> k) & 1u) == 0u {
             continue;
@@ -41,7 +47,10 @@ fn prescribed(item: u32) {
         let v = velocity[place];
         let force = acceleration[place] / inverse_mass[node];
         let aim = targets[3u * item + k] * row.motion;
-        let a = (aim - v * keep_gain.x) / keep_gain.y - gravity[k];
+        var a = (aim - v * keep_gain.x) / keep_gain.y;
+#if GRAVITY
+        a = a - gravity[k];
+#endif
         acceleration[place] = a;
         let mean = (v + aim) * 0.5;
         // a node that is held altogether carries no added mass

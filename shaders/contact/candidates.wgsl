@@ -41,6 +41,13 @@ struct Best {
     behind: Near,
 }
 
+// Whether slaves are nodes of threads.
+#if THREAD
+const IS_THREAD: bool = true;
+#else
+const IS_THREAD: bool = false;
+#endif
+
 // A slot: key, ring position, slice, state.
 struct Slot {
     key: u32,
@@ -72,7 +79,7 @@ fn across(slave: u32, body: u32, image: vec2<i32>, ring: i32, slice: i32) -> Edg
 }
 
 // The best faces of a slab, whose first one is at `first` around the ring.
-fn best_of(slave: u32, body: u32, image: vec2<i32>, slice: i32, first: i32, is_thread: bool, reach: f32) -> Best {
+fn best_of(slave: u32, body: u32, image: vec2<i32>, slice: i32, first: i32, reach: f32) -> Best {
     let nowhere = Near(FAR, Place(0, 0));
     var best = Best(key(body, image), nowhere, nowhere);
     var here = across(slave, body, image, first, slice);
@@ -90,9 +97,9 @@ fn best_of(slave: u32, body: u32, image: vec2<i32>, slice: i32, first: i32, is_t
             continue;
         }
         let face = Near(point.distance, Place(ring, slice));
-        if height(point) >= 0.0 || is_thread && !point.interior {
+        if height(point) >= 0.0 || IS_THREAD && !point.interior {
             best.in_front = nearer(best.in_front, face);
-        } else if normal_and_distance(point, is_thread).faces {
+        } else if normal_and_distance(point, IS_THREAD).faces {
             best.behind = nearer(best.behind, face);
         }
     }
@@ -103,11 +110,15 @@ fn candidates(item: u32) {
     let back = inverse();
     let stretched = stretch(back);
     let slave = slaves[SLAVE * item];
+#if THREAD
+#else
     let own = slaves[SLAVE * item + 1u];
-    let is_thread = own == EMPTY;
+#endif
     let reach = values[SLAVE_VALUES * item + 1u] + params.skin;
     let position = absolute(back, slave);
+#if PERIODIC
     let period = vec2<f32>(params.period) * QUANTUM;
+#endif
     var found: array<Best, MOST>;
     var count = 0u;
     if is_finite(position.x) && is_finite(position.y) && is_finite(position.z) {
@@ -122,10 +133,17 @@ fn candidates(item: u32) {
             let middle = vec2<f32>(boxes[BOX * near], boxes[BOX * near + 1u]);
             let low = boxes[BOX * near + 2u];
             let high = boxes[BOX * near + 3u];
-            if body == own || position.z < low - reach || position.z > high + reach {
+#if THREAD
+#else
+            if body == own {
+                continue;
+            }
+#endif
+            if position.z < low - reach || position.z > high + reach {
                 continue;
             }
             var image = vec2<i32>(0);
+#if PERIODIC
             if params.period.x != 0 {
                 image.x = to_i32((position.x - middle.x) / period.x);
             }
@@ -133,16 +151,22 @@ fn candidates(item: u32) {
                 image.y = to_i32((position.y - middle.y) / period.y);
             }
             let from_middle = abs(position.xy - middle - vec2<f32>(image) * period);
+#else
+            let from_middle = abs(position.xy - middle);
+#endif
             let room = vec2<f32>(boxes[BOX * near + 4u], boxes[BOX * near + 5u]) + reach * stretched;
             if any(from_middle > room) {
                 continue;
             }
+            var slice = i32(slabs[SLAB * near + 1u]);
+#if PERIODIC
             // a closed yarn goes on through its own images: count its slices on instead
             let turns = image.x * wrap_of(body).x + image.y * wrap_of(body).y;
-            let lateral = image - turns * wrap_of(body);
-            let slice = i32(slabs[SLAB * near + 1u]) + turns * slices_of(body);
+            image = image - turns * wrap_of(body);
+            slice = slice + turns * slices_of(body);
+#endif
             let first = i32(slabs[SLAB * near + 2u]);
-            let best = best_of(slave, body, lateral, slice, first, is_thread, reach);
+            let best = best_of(slave, body, image, slice, first, reach);
             if best.in_front.distance == FAR && best.behind.distance == FAR {
                 continue;
             }
@@ -176,14 +200,17 @@ fn candidates(item: u32) {
     if count > params.slots {
         atomicOr(&status[FLAGS], SLOTS_FULL);
     }
-    // new candidates go into the slots; known ones keep their friction, and their face while they touch
+    // new candidates go into the slots; known ones keep their state, and their face while they touch
+    let size = params.state;
     let first_slot = params.slots * item;
     var old: array<Slot, MOST>;
     let known_slots = min(params.slots, MOST);
     for (var slot = 0u; slot < known_slots; slot++) {
         let k = SLOT_KEYS * (first_slot + slot);
-        let s = SLOT_STATE * (first_slot + slot);
-        let state = vec4<f32>(states[s], states[s + 1u], states[s + 2u], states[s + 3u]);
+        var state = vec4<f32>(0.0);
+        for (var i = 0u; i < size; i++) {
+            state[i] = states[size * (first_slot + slot) + i];
+        }
         old[slot] = Slot(keys[k], keys[k + 1u], keys[k + 2u], state);
     }
     for (var slot = 0u; slot < params.slots; slot++) {
@@ -198,7 +225,7 @@ fn candidates(item: u32) {
             for (var i = 0u; i < known_slots; i++) {
                 if old[i].key == best.key {
                     now.state = old[i].state;
-                    if old[i].state.w > 0.0 {
+                    if old[i].state.x > 0.0 {
                         now.ring = old[i].ring;
                         now.slice = old[i].slice;
                     }
@@ -207,14 +234,12 @@ fn candidates(item: u32) {
             }
         }
         let k = SLOT_KEYS * (first_slot + slot);
-        let s = SLOT_STATE * (first_slot + slot);
         keys[k] = now.key;
         keys[k + 1u] = now.ring;
         keys[k + 2u] = now.slice;
-        states[s] = now.state.x;
-        states[s + 1u] = now.state.y;
-        states[s + 2u] = now.state.z;
-        states[s + 3u] = now.state.w;
+        for (var i = 0u; i < size; i++) {
+            states[size * (first_slot + slot) + i] = now.state[i];
+        }
     }
 }
 #endif

@@ -1,7 +1,7 @@
 // A face of a structured surface seen from a slave point: closest point on a bilinear patch, and the walk over the surface.
 // What includes this binds `reference`, `quanta` and `remainder`; with BODIES, for the nodes of surfaces, also `bodies` and
 // `ring_lines`. With TOUCH it defines `fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest)` for the faces
-// that are found.
+// that are found; nodes of threads (THREAD) may touch several.
 
 #include "kernel/row"
 #include "kernel/vector"
@@ -68,7 +68,11 @@ fn div_euclid(a: i32, n: i32) -> i32 {
 // Reference and current position of a surface node relative to the slave node.
 fn from_slave(slave: u32, seen: Imaged) -> FromSlave {
     let rest = lattice_between(seen.node, slave, seen.shift);
+#if PERIODIC
     return FromSlave(rest, (rest + apply(gradient(), rest)) + displacement_between(seen.node, slave));
+#else
+    return FromSlave(rest, rest + displacement_between(seen.node, slave));
+#endif
 }
 
 #if BODIES
@@ -80,6 +84,7 @@ fn slices_of(body: u32) -> i32 {
     return i32(bodies[BODY * body + 2u]);
 }
 
+#if PERIODIC
 fn is_closed(body: u32) -> bool {
     return bodies[BODY * body + 3u] == 1u;
 }
@@ -87,10 +92,12 @@ fn is_closed(body: u32) -> bool {
 fn wrap_of(body: u32) -> vec2<i32> {
     return vec2<i32>(bitcast<i32>(bodies[BODY * body + 4u]), bitcast<i32>(bodies[BODY * body + 5u]));
 }
+#endif
 
 // A node of a body's surface, and its image shift in quanta.
 fn node(body: u32, image: vec2<i32>, place: Place) -> Imaged {
     let line = ring_lines[bodies[BODY * body] + u32(rem_euclid(place.ring, ring_of(body)))];
+#if PERIODIC
     var shown = image;
     var slice = place.slice;
     if is_closed(body) {
@@ -99,6 +106,9 @@ fn node(body: u32, image: vec2<i32>, place: Place) -> Imaged {
         shown = image + turns * wrap_of(body);
     }
     return Imaged(line + u32(slice), shown * params.period);
+#else
+    return Imaged(line + u32(place.slice), image);
+#endif
 }
 
 // The corners of a face.
@@ -120,7 +130,12 @@ fn corners(slave: u32, body: u32, image: vec2<i32>, place: Place) -> Corners {
 
 // Whether a slice of faces is on the body.
 fn has_slice(body: u32, slice: i32) -> bool {
-    return is_closed(body) || (slice >= 0 && slice < slices_of(body));
+#if PERIODIC
+    if is_closed(body) {
+        return true;
+    }
+#endif
+    return slice >= 0 && slice < slices_of(body);
 }
 #endif
 
@@ -238,11 +253,6 @@ fn weights(point: Closest) -> vec4<f32> {
 #if TOUCH
 // Faces that a walk passes at most.
 const MOST_FACES: u32 = 12u;
-// Faces that a thread node can touch at once.
-const MOST_TOUCHED: u32 = 12u;
-// Places around the ring that are looked at on either side of the closest face.
-const RING_REACH: i32 = 3;
-
 // Walks from a face downhill in distance to the one closest to the slave.
 fn walk(slave: u32, body: u32, image: vec2<i32>, from_place: Place) -> Walked {
     var here: Walked;
@@ -285,6 +295,12 @@ fn walk(slave: u32, body: u32, image: vec2<i32>, from_place: Place) -> Walked {
     here.place.ring = rem_euclid(here.place.ring, ring_of(body));
     return here;
 }
+
+#if THREAD
+// Faces that a thread node can touch at once.
+const MOST_TOUCHED: u32 = 12u;
+// Places around the ring that are looked at on either side of the closest face.
+const RING_REACH: i32 = 3;
 
 // Touches all further faces within `reach` (mm) of the slave, found by spreading from the closest one.
 fn faces_within(all: ptr<function, Touch>, slave: u32, body: u32, image: vec2<i32>, first: Walked, reach: f32) {
@@ -389,4 +405,5 @@ fn borders_within(corners: Corners, point: Closest, reach: f32) -> Borders {
         is_within(1.0 - point.xi, slice, room),
     );
 }
+#endif
 #endif

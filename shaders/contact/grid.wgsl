@@ -9,12 +9,15 @@ fn clear(cell: u32) {
 }
 #endif
 #else
-#if fill
+#if fill_slabs
 #define STATUS
 #define BODIES
 #endif
+#if fill_beams
+#define STATUS
+#endif
 #include "contact/face"
-#if fill
+#if fill_beams
 #include "elements/beam2"
 #endif
 
@@ -34,12 +37,16 @@ struct Inverse {
 }
 
 fn inverse() -> Inverse {
+#if PERIODIC
     let a = 1.0 + row.gradient_xx;
     let b = row.gradient_xy;
     let c = row.gradient_yx;
     let d = 1.0 + row.gradient_yy;
     let scale = 1.0 / (a * d - b * c);
     return Inverse(vec2<f32>(d * scale, -(b * scale)), vec2<f32>(-(c * scale), a * scale));
+#else
+    return Inverse(vec2<f32>(1.0, 0.0), vec2<f32>(0.0, 1.0));
+#endif
 }
 
 fn pull_back(back: Inverse, v: vec3<f32>) -> vec2<f32> {
@@ -67,9 +74,11 @@ fn cells(axis: u32, low: f32, high: f32) -> vec2<i32> {
     let x = (vec2<f32>(low, high) - params.origin[axis]) / params.cell[axis];
     let cell = vec2<i32>(floor(clamp(x, vec2<f32>(-1e6), vec2<f32>(1e6))));
     let last = i32(params.cells[axis]) - 1;
+#if PERIODIC
     if params.period[axis] != 0 {
         return vec2<i32>(cell.x, min(cell.y, cell.x + last));
     }
+#endif
     return clamp(cell, vec2<i32>(0), vec2<i32>(last));
 }
 
@@ -80,18 +89,23 @@ fn cell_index(x: i32, y: i32) -> u32 {
 }
 
 #if ROOT
-@group(1) @binding(0) var<storage, read> slabs: array<u32>;
-@group(1) @binding(1) var<storage, read> bodies: array<u32>;
-@group(1) @binding(2) var<storage, read> ring_lines: array<u32>;
-@group(1) @binding(3) var<storage, read> reference: array<i32>;
-@group(1) @binding(4) var<storage, read> quanta: array<i32>;
-@group(1) @binding(5) var<storage, read> remainder: array<f32>;
-@group(1) @binding(6) var<storage, read> ends: array<u32>;
-@group(1) @binding(7) var<storage, read> beams: array<f32>;
-@group(1) @binding(8) var<storage, read_write> counts: array<atomic<u32>>;
-@group(1) @binding(9) var<storage, read_write> lists: array<u32>;
-@group(1) @binding(10) var<storage, read_write> boxes: array<f32>;
-@group(1) @binding(11) var<storage, read_write> status: array<atomic<u32>>;
+@group(1) @binding(0) var<storage, read> reference: array<i32>;
+@group(1) @binding(1) var<storage, read> quanta: array<i32>;
+@group(1) @binding(2) var<storage, read> remainder: array<f32>;
+#if fill_slabs
+@group(1) @binding(3) var<storage, read> slabs: array<u32>;
+@group(1) @binding(4) var<storage, read> bodies: array<u32>;
+@group(1) @binding(5) var<storage, read> ring_lines: array<u32>;
+const WRITES: u32 = 6u;
+#else
+@group(1) @binding(3) var<storage, read> ends: array<u32>;
+@group(1) @binding(4) var<storage, read> beams: array<f32>;
+const WRITES: u32 = 5u;
+#endif
+@group(1) @binding(WRITES) var<storage, read_write> counts: array<atomic<u32>>;
+@group(1) @binding(WRITES + 1u) var<storage, read_write> lists: array<u32>;
+@group(1) @binding(WRITES + 2u) var<storage, read_write> boxes: array<f32>;
+@group(1) @binding(WRITES + 3u) var<storage, read_write> status: array<atomic<u32>>;
 
 // The box of an item, from its first node.
 struct Bounds {
@@ -104,31 +118,8 @@ fn grow(bounds: Bounds, back: Inverse, v: vec3<f32>) -> Bounds {
     return Bounds(min(bounds.low, x), max(bounds.high, x));
 }
 
-fn fill(item: u32) {
-    let back = inverse();
-    var origin: u32;
-    var reach: f32;
-    var bounds = Bounds(vec3<f32>(0.0), vec3<f32>(0.0));
-    if item < params.slabs {
-        let body = slabs[SLAB * item];
-        let slice = i32(slabs[SLAB * item + 1u]);
-        let first = i32(slabs[SLAB * item + 2u]);
-        origin = node(body, vec2<i32>(0), Place(first, slice)).node;
-        let last = min(first + SLAB_FACES, ring_of(body));
-        for (var ring = first; ring <= last; ring++) {
-            for (var end = slice; end <= slice + 1; end++) {
-                let seen = node(body, vec2<i32>(0), Place(ring, end));
-                bounds = grow(bounds, back, from_slave(origin, seen).current);
-            }
-        }
-        reach = params.thread_radius + params.skin;
-    } else {
-        let beam = item - params.slabs;
-        origin = ends[2u * beam];
-        let along = vector(beam);
-        bounds = grow(bounds, back, along.reference + along.change);
-        reach = 2.0 * params.thread_radius + params.skin;
-    }
+// Puts an item into every cell that its box touches, `reach` around.
+fn put(item: u32, origin: u32, back: Inverse, bounds: Bounds, reach: f32) {
     let base = absolute(back, origin);
     let low = bounds.low;
     let high = bounds.high;
@@ -153,5 +144,34 @@ fn fill(item: u32) {
         }
     }
 }
+
+#if fill_slabs
+fn fill_slabs(item: u32) {
+    let back = inverse();
+    var bounds = Bounds(vec3<f32>(0.0), vec3<f32>(0.0));
+    let body = slabs[SLAB * item];
+    let slice = i32(slabs[SLAB * item + 1u]);
+    let first = i32(slabs[SLAB * item + 2u]);
+    let origin = node(body, vec2<i32>(0), Place(first, slice)).node;
+    let last = min(first + SLAB_FACES, ring_of(body));
+    for (var ring = first; ring <= last; ring++) {
+        for (var end = slice; end <= slice + 1; end++) {
+            let seen = node(body, vec2<i32>(0), Place(ring, end));
+            bounds = grow(bounds, back, from_slave(origin, seen).current);
+        }
+    }
+    put(item, origin, back, bounds, params.thread_radius + params.skin);
+}
+#endif
+
+#if fill_beams
+fn fill_beams(item: u32) {
+    let back = inverse();
+    let beam = item - params.slabs;
+    let along = vector(beam);
+    let bounds = grow(Bounds(vec3<f32>(0.0), vec3<f32>(0.0)), back, along.reference + along.change);
+    put(item, ends[2u * beam], back, bounds, 2.0 * params.thread_radius + params.skin);
+}
+#endif
 #endif
 #endif

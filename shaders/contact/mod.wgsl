@@ -51,6 +51,7 @@ struct Params {
     thread_thread: f32,
     self_arc: f32,
     depth: f32,
+    state: u32,
 }
 
 @group(2) @binding(1) var<uniform> params: Params;

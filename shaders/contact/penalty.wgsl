@@ -1,4 +1,5 @@
-// Penalty contact of slave nodes with the surfaces of yarns, every step, for the candidates of each slave that can touch.
+// Penalty contact of slave nodes with the surfaces of yarns, every step, for the candidates of each slave that can touch:
+// nodes of threads with THREAD, else of yarn surfaces.
 // What includes this for `press` and `add_virial` defines PRESS and binds `sums`.
 
 // Integers of a slave: node, own body (or EMPTY for a thread).
@@ -7,17 +8,6 @@ const SLAVE: u32 = 2u;
 const SLAVE_VALUES: u32 = 2u;
 // Integers of a slot: key, ring position, slice.
 const SLOT_KEYS: u32 = 3u;
-// Numbers of a slot: elastic tangential displacement, mm (3); normal force, N, or less what is sure to be left of the gap, mm.
-const SLOT_STATE: u32 = 4u;
-// Sums of a slave or a beam.
-const SUMS: u32 = 14u;
-const SUM_FRICTION: u32 = 0u;
-const SUM_DAMPING: u32 = 1u;
-const SUM_RADIUS: u32 = 2u;
-const SUM_SLIP: u32 = 3u;
-const SUM_VIRIAL: u32 = 4u;
-const SUM_ENERGY: u32 = 13u;
-
 #if penalty
 #define PRESS
 #define STATUS
@@ -26,10 +16,30 @@ const SUM_ENERGY: u32 = 13u;
 #define TOUCH
 #define VELOCITY
 #include "contact/face"
-#include "contact/friction"
 #endif
 
 #if PRESS
+// Sums of a slave or a beam, and where the stress starts among them; numbers of a slot: normal force, N, or less what is sure
+// to be left of the gap, mm; with friction then the elastic tangential displacement, mm (3).
+const SUM_ENERGY: u32 = 0u;
+const SUM_DAMPING: u32 = 1u;
+const SUM_RADIUS: u32 = 2u;
+#if FRICTION
+#include "contact/friction"
+const SUM_FRICTION: u32 = 3u;
+const SUM_SLIP: u32 = 4u;
+const SUM_VIRIAL: u32 = 5u;
+const SLOT_STATE: u32 = 4u;
+#else
+const SUM_VIRIAL: u32 = 3u;
+const SLOT_STATE: u32 = 1u;
+#endif
+#if PERIODIC
+const SUMS: u32 = SUM_VIRIAL + 9u;
+#else
+const SUMS: u32 = SUM_VIRIAL;
+#endif
+
 // What presses two bodies apart.
 struct Press {
     elastic_force: f32,
@@ -54,6 +64,7 @@ fn add_sum(item: u32, sum: u32, value: f32) {
     sums[SUMS * item + sum] = sums[SUMS * item + sum] + value;
 }
 
+#if PERIODIC
 // Subtracts force ⊗ ΔX from the sum of an item that makes the homogenised stress.
 fn add_virial(item: u32, push: vec3<f32>, apart: vec3<f32>) {
     for (var i = 0u; i < 3u; i++) {
@@ -62,6 +73,7 @@ fn add_virial(item: u32, push: vec3<f32>, apart: vec3<f32>) {
         }
     }
 }
+#endif
 #endif
 
 #if ROOT
@@ -89,11 +101,17 @@ const AT_REST: f32 = 1e20;
 // Force that stands for a touch without pressure, N.
 const TOUCH: f32 = 1e-30;
 
+// Whether slaves are nodes of threads.
+#if THREAD
+const IS_THREAD: bool = true;
+#else
+const IS_THREAD: bool = false;
+#endif
+
 // A slave, and the faces of one body that push it: their normal forces, and what friction needs of the first one.
 struct Touch {
     item: u32,
     slave: u32,
-    is_thread: bool,
     stiff: f32,
     full_radius: f32,
     radius: f32,
@@ -103,9 +121,11 @@ struct Touch {
     normal_force: f32,
     energy: f32,
     touched: bool,
+#if FRICTION
     motion: vec3<f32>,
     apart: vec3<f32>,
     masters: Weighted,
+#endif
 }
 
 // One node with weight 1.
@@ -116,7 +136,7 @@ fn single(node: u32) -> Weighted {
 // Adds the normal force of a face.
 fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
     let slave = (*all).slave;
-    let side = normal_and_distance(point, (*all).is_thread);
+    let side = normal_and_distance(point, IS_THREAD);
     if !side.faces {
         return;
     }
@@ -136,7 +156,9 @@ fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
     apart = corners.reference[1] * -weights[1] + apart;
     apart = corners.reference[2] * -weights[2] + apart;
     apart = corners.reference[3] * -weights[3] + apart;
+#if PERIODIC
     motion = motion + apply(rate(), apart);
+#endif
     let approach = dot(motion, side.normal);
     if (*all).enters && depth > ENTRY - 2.0 * min(approach, 0.0) * (*all).elapsed {
         return;
@@ -149,18 +171,22 @@ fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
     let push = side.normal * pressed.pressing;
     (*all).push = (*all).push + push;
     (*all).normal_force = (*all).normal_force + pressed.pressing;
+#if PERIODIC
     add_virial(item, push, apart);
+#endif
     let masters = Weighted(4u, corners.nodes, weights);
     add_pair(push, single(slave), masters);
     add_stiffness(pressed.row_sum, masters);
     add_stiffness(pressed.row_sum, single(slave));
-    raise(PENETRATION + select(1u, 0u, (*all).is_thread), depth);
+    raise(PENETRATION + select(1u, 0u, IS_THREAD), depth);
+#if FRICTION
     if !(*all).touched {
-        (*all).touched = true;
         (*all).motion = motion;
         (*all).apart = apart;
         (*all).masters = masters;
     }
+#endif
+    (*all).touched = true;
 }
 
 fn penalty(item: u32) {
@@ -171,13 +197,14 @@ fn penalty(item: u32) {
     var all: Touch;
     all.item = item;
     all.slave = slaves[SLAVE * item];
-    all.is_thread = slaves[SLAVE * item + 1u] == EMPTY;
     all.stiff = values[SLAVE_VALUES * item];
     all.full_radius = values[SLAVE_VALUES * item + 1u];
     all.radius = all.full_radius * row.radius;
     all.elapsed = row.dt_mid + row.dt_mid - row.dt;
     let slave = all.slave;
+#if FRICTION
     let tangential = all.stiff * params.tangential;
+#endif
     let closing = row.approach * all.elapsed + all.full_radius * row.radius_increment;
     var touches = false;
     for (var slot = 0u; slot < params.slots; slot++) {
@@ -187,9 +214,9 @@ fn penalty(item: u32) {
         }
         let candidate = of_key(keys[k]);
         let s = SLOT_STATE * (params.slots * item + slot);
-        if states[s + 3u] < 0.0 {
-            let gap = states[s + 3u] + closing;
-            states[s + 3u] = gap;
+        if states[s] < 0.0 {
+            let gap = states[s] + closing;
+            states[s] = gap;
             if gap < 0.0 {
                 continue;
             }
@@ -199,44 +226,65 @@ fn penalty(item: u32) {
         let point = found.point;
         keys[k + 1u] = u32(found.place.ring);
         keys[k + 2u] = u32(found.place.slice);
-        let elastic = vec3<f32>(states[s], states[s + 1u], states[s + 2u]);
-        let open = !all.is_thread && !is_closed(candidate.body);
-        all.enters = open && states[s + 3u] <= 0.0 && row.approach < AT_REST;
+#if THREAD
+        all.enters = false;
+#else
+        var open = true;
+#if PERIODIC
+        open = !is_closed(candidate.body);
+#endif
+        all.enters = open && states[s] <= 0.0 && row.approach < AT_REST;
+#endif
         all.push = vec3<f32>(0.0);
         all.normal_force = 0.0;
         all.touched = false;
         touch(&all, found.corners, point);
-        if all.is_thread && point.distance < all.radius {
+#if THREAD
+        if point.distance < all.radius {
             faces_within(&all, slave, candidate.body, candidate.image, found, all.radius);
         }
+#endif
         let size = norm(all.push);
+#if FRICTION
+        let elastic = vec3<f32>(states[s + 1u], states[s + 2u], states[s + 3u]);
+#endif
         if !(all.touched && size > 0.0) {
+#if FRICTION
             add_sum(item, SUM_FRICTION, 0.5 * tangential * dot(elastic, elastic));
-            // a point behind a face keeps being looked at
-            let gap = select(0.0, point.distance - all.radius, all.is_thread || height(point) > 0.0);
-            states[s] = 0.0;
             states[s + 1u] = 0.0;
             states[s + 2u] = 0.0;
-            states[s + 3u] = select(-max(gap, 0.0), TOUCH, open && all.touched);
+            states[s + 3u] = 0.0;
+#endif
+#if THREAD
+            states[s] = -max(point.distance - all.radius, 0.0);
+#else
+            // a point behind a face keeps being looked at
+            let gap = select(0.0, point.distance - all.radius, height(point) > 0.0);
+            states[s] = select(-max(gap, 0.0), TOUCH, open && all.touched);
+#endif
             continue;
         }
         touches = true;
+        states[s] = all.normal_force;
+#if FRICTION
         let limit = params.friction * all.normal_force;
         let slid = slide(elastic, all.motion * all.elapsed, all.push * (1.0 / size), tangential, limit);
         add_sum(item, SUM_FRICTION, slid.dissipated);
         add_sum(item, SUM_SLIP, slid.slip);
-        states[s] = slid.elastic.x;
-        states[s + 1u] = slid.elastic.y;
-        states[s + 2u] = slid.elastic.z;
-        states[s + 3u] = all.normal_force;
+        states[s + 1u] = slid.elastic.x;
+        states[s + 2u] = slid.elastic.y;
+        states[s + 3u] = slid.elastic.z;
         all.energy = all.energy + 0.5 * tangential * dot(slid.elastic, slid.elastic);
         let drag = slid.elastic * -tangential;
+#if PERIODIC
         add_virial(item, drag, all.apart);
+#endif
         add_pair(drag, single(slave), all.masters);
+#endif
     }
     sums[SUMS * item + SUM_ENERGY] = all.energy;
     if touches {
-        atomicAdd(&status[TOUCHING + select(1u, 0u, all.is_thread)], 1u);
+        atomicAdd(&status[TOUCHING + select(1u, 0u, IS_THREAD)], 1u);
     }
 }
 #endif

@@ -1,8 +1,11 @@
 // How far slaves have slipped since the start.
 
-
+#if PERIODIC
 const SUMS: u32 = 14u;
-const SUM_SLIP: u32 = 3u;
+#else
+const SUMS: u32 = 5u;
+#endif
+const SUM_SLIP: u32 = 4u;
 
 #if ROOT
 @group(1) @binding(0) var<storage, read> sums: array<f32>;

@@ -9,14 +9,9 @@
 #include "contact/grid"
 #include "contact/penalty"
 #include "elements/beam2"
-#if force
-#include "contact/friction"
-#endif
 
 // Numbers of a beam's place on its thread: arc length of its middle, mm; its length, mm; length of a closed thread, mm, else 0.
 const ARC: u32 = 3u;
-// Numbers of a slot: elastic tangential displacement, mm (3); normal force, N.
-const STATE: u32 = 4u;
 
 // Coordinates (0 to 1) of the closest points of segment `0 → d1` and segment `start → start + d2`.
 fn closest_points(d1: vec3<f32>, d2: vec3<f32>, start: vec3<f32>) -> vec2<f32> {
@@ -58,7 +53,11 @@ fn unit(x: f32) -> f32 {
 
 // From the first node of beam `a` to the first node of beam `b` in an image, in the reference and now.
 fn between(a: u32, b: u32, image: vec2<i32>) -> FromSlave {
+#if PERIODIC
     return from_slave(ends[2u * a], Imaged(ends[2u * b], image * params.period));
+#else
+    return from_slave(ends[2u * a], Imaged(ends[2u * b], image));
+#endif
 }
 
 #if pairs
@@ -87,10 +86,14 @@ fn neighbours(a: u32, b: u32) -> bool {
 
 fn pairs(beam: u32) {
     let back = inverse();
+#if PERIODIC
     let period = vec2<f32>(params.period) * QUANTUM;
+#endif
     let reach = 2.0 * params.thread_radius + params.skin;
     let at_box = BOX * (params.slabs + beam);
+#if PERIODIC
     let middle = vec2<f32>(boxes[at_box], boxes[at_box + 1u]);
+#endif
     let own = vector(beam);
     let along = own.reference + own.change;
     let start = absolute(back, ends[2u * beam]).xy;
@@ -117,12 +120,14 @@ fn pairs(beam: u32) {
                     continue;
                 }
                 var image = vec2<i32>(0);
+#if PERIODIC
                 if params.period.x != 0 {
                     image.x = to_i32((middle.x - boxes[BOX * near]) / period.x);
                 }
                 if params.period.y != 0 {
                     image.y = to_i32((middle.y - boxes[BOX * near + 1u]) / period.y);
                 }
+#endif
                 let apart = between(beam, other, image).current;
                 let theirs = vector(other);
                 let direction = theirs.reference + theirs.change;
@@ -156,12 +161,14 @@ fn pairs(beam: u32) {
         atomicOr(&status[FLAGS], SLOTS_FULL);
         count = slots;
     }
+    let size = params.state;
     var old: array<u32, MOST_PAIRS>;
     var old_state: array<vec4<f32>, MOST_PAIRS>;
     for (var slot = 0u; slot < slots; slot++) {
-        let s = STATE * (slots * beam + slot);
         old[slot] = keys[slots * beam + slot];
-        old_state[slot] = vec4<f32>(states[s], states[s + 1u], states[s + 2u], states[s + 3u]);
+        for (var i = 0u; i < size; i++) {
+            old_state[slot][i] = states[size * (slots * beam + slot) + i];
+        }
     }
     for (var slot = 0u; slot < slots; slot++) {
         var pair = EMPTY;
@@ -175,12 +182,10 @@ fn pairs(beam: u32) {
                 }
             }
         }
-        let s = STATE * (slots * beam + slot);
         keys[slots * beam + slot] = pair;
-        states[s] = state.x;
-        states[s + 1u] = state.y;
-        states[s + 2u] = state.z;
-        states[s + 3u] = state.w;
+        for (var i = 0u; i < size; i++) {
+            states[size * (slots * beam + slot) + i] = state[i];
+        }
     }
 }
 #endif
@@ -207,7 +212,9 @@ fn force(beam: u32) {
     }
     let radius = params.thread_radius * row.radius;
     let elapsed = row.dt_mid + row.dt_mid - row.dt;
+#if FRICTION
     let tangential = params.thread_thread * params.tangential;
+#endif
     var energy = 0.0;
     var touches = false;
     let own = vector(beam);
@@ -226,14 +233,18 @@ fn force(beam: u32) {
         let offset = along * st.x - (direction * st.y + apart.current);
         let distance = norm(offset);
         let depth = radius + radius - distance;
-        let s = STATE * (slots * beam + slot);
-        let elastic = vec3<f32>(states[s], states[s + 1u], states[s + 2u]);
+        let s = SLOT_STATE * (slots * beam + slot);
+#if FRICTION
+        let elastic = vec3<f32>(states[s + 1u], states[s + 2u], states[s + 3u]);
+#endif
         if depth <= 0.0 || distance < 1e-6 {
-            add_sum(beam, SUM_FRICTION, 0.5 * tangential * dot(elastic, elastic));
             states[s] = 0.0;
+#if FRICTION
+            add_sum(beam, SUM_FRICTION, 0.5 * tangential * dot(elastic, elastic));
             states[s + 1u] = 0.0;
             states[s + 2u] = 0.0;
             states[s + 3u] = 0.0;
+#endif
             continue;
         }
         touches = true;
@@ -251,23 +262,32 @@ fn force(beam: u32) {
             inverse_mass = inverse_mass + others.weights[i] * others.weights[i] / mass[others.nodes[i]];
         }
         let rest = own.reference * st.x - (theirs.reference * st.y + apart.reference);
+#if PERIODIC
         motion = motion + apply(rate(), rest);
+#endif
         let approach = dot(motion, normal);
         let pressed = press(params.thread_thread, depth, inverse_mass, approach);
         add_sum(beam, SUM_DAMPING, (pressed.elastic_force - pressed.pressing) * approach * elapsed);
         let growth = 2.0 * params.thread_radius * row.radius_increment;
         add_sum(beam, SUM_RADIUS, pressed.elastic_force * growth);
+        states[s] = pressed.pressing;
+        var stored = pressed.elastic_force * depth;
+        var push = normal * pressed.pressing;
+#if FRICTION
         let limit = params.friction * pressed.pressing;
         let slid = slide(elastic, motion * elapsed, normal, tangential, limit);
         add_sum(beam, SUM_FRICTION, slid.dissipated);
         add_sum(beam, SUM_SLIP, slid.slip);
-        states[s] = slid.elastic.x;
-        states[s + 1u] = slid.elastic.y;
-        states[s + 2u] = slid.elastic.z;
-        states[s + 3u] = pressed.pressing;
-        energy = energy + 0.5 * (pressed.elastic_force * depth + tangential * dot(slid.elastic, slid.elastic));
-        let push = normal * pressed.pressing - slid.elastic * tangential;
+        states[s + 1u] = slid.elastic.x;
+        states[s + 2u] = slid.elastic.y;
+        states[s + 3u] = slid.elastic.z;
+        stored = stored + tangential * dot(slid.elastic, slid.elastic);
+        push = push - slid.elastic * tangential;
+#endif
+        energy = energy + 0.5 * stored;
+#if PERIODIC
         add_virial(beam, push, rest);
+#endif
         add_pair(push, nodes, others);
         add_stiffness(pressed.row_sum, nodes);
         add_stiffness(pressed.row_sum, others);

@@ -1,4 +1,4 @@
-// How far nodes have moved since the last search, how fast they are, and whether they are still numbers in range.
+// How fast nodes are, whether they are still numbers in range, and with CONTACT how far they have moved since the last search.
 
 #include "kernel/position"
 #if travel
@@ -24,28 +24,41 @@ fn remember(node: u32) {
 #endif
 
 #if travel
-@group(1) @binding(2) var<storage, read> search_quanta: array<i32>;
-@group(1) @binding(3) var<storage, read> search_remainder: array<f32>;
-@group(1) @binding(4) var<storage, read> velocity: array<f32>;
+@group(1) @binding(2) var<storage, read> velocity: array<f32>;
+#if CONTACT
+@group(1) @binding(3) var<storage, read> search_quanta: array<i32>;
+@group(1) @binding(4) var<storage, read> search_remainder: array<f32>;
 @group(1) @binding(5) var<storage, read_write> status: array<atomic<u32>>;
+#else
+@group(1) @binding(3) var<storage, read_write> status: array<atomic<u32>>;
+#endif
 
 fn travel(node: u32) {
     let plane = arrayLength(&remainder) / 3u;
-    var square = 0.0;
+    var far = 0.0;
     var furthest = 0.0;
+#if CONTACT
+    var square = 0.0;
+#endif
     for (var k = 0u; k < 3u; k++) {
         let i = node + k * plane;
+#if CONTACT
         let d = difference(quanta[i], remainder[i], search_quanta[i], search_remainder[i]);
         square = square + d * d;
-        furthest = max(furthest, abs(in_mm(quanta[i], remainder[i])));
+#endif
+        let moved = in_mm(quanta[i], remainder[i]);
+        far = far + moved * moved;
+        furthest = max(furthest, abs(moved));
     }
-    if !is_finite(square) {
+    if !is_finite(far) {
         atomicOr(&status[FLAGS], NOT_FINITE);
     } else if furthest > MOST_MM {
         atomicOr(&status[FLAGS], OUT_OF_RANGE);
     }
     let v = vec3<f32>(velocity[node], velocity[node + plane], velocity[node + 2u * plane]);
+#if CONTACT
     raise(TRAVEL, sqrt(square));
+#endif
     raise(SPEED, sqrt(dot(v, v)));
 }
 #endif

@@ -6,7 +6,11 @@
 // Corner slots a solid node gathers.
 const SOLID: u32 = 8u;
 // Slots a thread node gathers.
-const THREAD: u32 = 5u;
+const THREAD: u32 = 2u;
+#if BENDING
+// And with bending.
+const BENT: u32 = 3u;
+#endif
 // Nothing to gather.
 const NONE: u32 = 0xffffffffu;
 
@@ -33,13 +37,19 @@ struct Params {
 @group(1) @binding(1) var<storage, read> hex_force: array<f32>;
 @group(1) @binding(2) var<storage, read> thread_slots: array<u32>;
 @group(1) @binding(3) var<storage, read> beam_force: array<f32>;
-@group(1) @binding(4) var<storage, read> bend_force: array<f32>;
-@group(1) @binding(5) var<storage, read> mass: array<f32>;
-#if MASS_ADDED
-@group(1) @binding(6) var<storage, read> element_stiffness: array<f32>;
-const WRITES: u32 = 7u;
+@group(1) @binding(4) var<storage, read> mass: array<f32>;
+#if BENDING
+@group(1) @binding(5) var<storage, read> bend_slots: array<u32>;
+@group(1) @binding(6) var<storage, read> bend_force: array<f32>;
+const READS: u32 = 7u;
 #else
-const WRITES: u32 = 6u;
+const READS: u32 = 5u;
+#endif
+#if MASS_ADDED
+@group(1) @binding(READS) var<storage, read> element_stiffness: array<f32>;
+const WRITES: u32 = READS + 1u;
+#else
+const WRITES: u32 = READS;
 #endif
 @group(1) @binding(WRITES) var<storage, read_write> acceleration: array<f32>;
 @group(1) @binding(WRITES + 1u) var<storage, read_write> inverse_mass: array<f32>;
@@ -70,10 +80,12 @@ fn beam_at(slot: u32) -> vec3<f32> {
     return vec3<f32>(beam_force[3u * slot], beam_force[3u * slot + 1u], beam_force[3u * slot + 2u]);
 }
 
+#if BENDING
 fn bend_at(slot: u32, k: u32) -> vec3<f32> {
     let at = 6u * slot + 3u * k;
     return vec3<f32>(bend_force[at], bend_force[at + 1u], bend_force[at + 2u]);
 }
+#endif
 
 fn assemble(node: u32) {
     let plane = arrayLength(&mass);
@@ -95,17 +107,20 @@ fn assemble(node: u32) {
         if thread_slots[at + 1u] != NONE {
             force = force - beam_at(thread_slots[at + 1u]);
         }
+#if BENDING
         // the first, middle and last node of three bends
-        if thread_slots[at + 2u] != NONE {
-            force = force + bend_at(thread_slots[at + 2u], 0u);
+        let bent = BENT * (node - params.first_thread);
+        if bend_slots[bent] != NONE {
+            force = force + bend_at(bend_slots[bent], 0u);
         }
-        if thread_slots[at + 3u] != NONE {
-            force = force - bend_at(thread_slots[at + 3u], 0u);
-            force = force + bend_at(thread_slots[at + 3u], 1u);
+        if bend_slots[bent + 1u] != NONE {
+            force = force - bend_at(bend_slots[bent + 1u], 0u);
+            force = force + bend_at(bend_slots[bent + 1u], 1u);
         }
-        if thread_slots[at + 4u] != NONE {
-            force = force - bend_at(thread_slots[at + 4u], 1u);
+        if bend_slots[bent + 2u] != NONE {
+            force = force - bend_at(bend_slots[bent + 2u], 1u);
         }
+#endif
     }
     var acting = mass[node];
 #if CONTACT

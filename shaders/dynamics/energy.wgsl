@@ -61,7 +61,7 @@ fn kinetic(item: u32, local: u32) {
 @group(1) @binding(2) var<storage, read_write> totals: array<f32>;
 
 // Numbers of a beam in the table.
-const TABLE: u32 = 6u;
+const TABLE: u32 = 5u;
 
 fn axial(item: u32, local: u32) {
     let first = item * params.length;

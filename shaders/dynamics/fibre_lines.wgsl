@@ -36,7 +36,11 @@ var<workgroup> rows: array<vec4<f32>, STATIONS>;
 // Current direction of the segment between two nodes.
 fn direction(here: u32, next: u32, shift: vec2<i32>) -> vec3<f32> {
     let rest = lattice_between(next, here, shift);
+#if PERIODIC
     let v = rest + apply(gradient(), rest) + displacement_between(next, here);
+#else
+    let v = rest + displacement_between(next, here);
+#endif
     return v * (1.0 / norm(v));
 }
 
@@ -63,8 +67,10 @@ fn fibre_lines(number: u32, local: u32) {
     }
     let n = groups[group + 2u];
     let first = groups[group] + lane * n;
+#if PERIODIC
     let closed = groups[group + 3u] == 1u;
     let wrap = vec2<i32>(bitcast<i32>(groups[group + 4u]), bitcast<i32>(groups[group + 5u]));
+#endif
     let last = n - 1u;
 
     for (var i = local; i < n; i += WORKGROUP) {
@@ -72,9 +78,12 @@ fn fibre_lines(number: u32, local: u32) {
         var d = vec3<f32>();
         if stiffness[here] > 0.0 && i < last {
             d = direction(here, here + 1u, vec2<i32>());
-        } else if stiffness[here] > 0.0 && closed {
+        }
+#if PERIODIC
+        if stiffness[here] > 0.0 && i == last && closed {
             d = direction(here, first, wrap);
         }
+#endif
         stations[i] = vec4<f32>(d, inverse_mass[here]);
     }
     workgroupBarrier();

@@ -1,13 +1,15 @@
-// Central differences with mass-proportional damping.
+// Central differences.
 
 #include "kernel/row"
 #include "kernel/position"
 
+#if DAMPING
 // Factors on the old velocity and on the acceleration.
 fn factors(damping: f32, dt: f32) -> vec2<f32> {
     let half_step = damping * dt * 0.5;
     return vec2<f32>((1.0 - half_step) / (1.0 + half_step), dt / (1.0 + half_step));
 }
+#endif
 
 #if ROOT
 struct Params {
@@ -20,39 +22,72 @@ struct Params {
 @group(2) @binding(1) var<uniform> params: Params;
 
 @group(1) @binding(0) var<storage, read> acceleration: array<f32>;
+#if WORKS
 @group(1) @binding(1) var<storage, read> mass: array<f32>;
-@group(1) @binding(2) var<storage, read> inverse_mass: array<f32>;
-#if LINES
-@group(1) @binding(3) var<storage, read> correction: array<f32>;
-const WRITES: u32 = 4u;
+const ACTING: u32 = 2u;
 #else
-const WRITES: u32 = 3u;
+const ACTING: u32 = 1u;
+#endif
+#if MASS_ADDED
+@group(1) @binding(ACTING) var<storage, read> inverse_mass: array<f32>;
+const READS: u32 = ACTING + 1u;
+#else
+const READS: u32 = ACTING;
+#endif
+#if LINES
+@group(1) @binding(READS) var<storage, read> correction: array<f32>;
+const WRITES: u32 = READS + 1u;
+#else
+const WRITES: u32 = READS;
 #endif
 @group(1) @binding(WRITES) var<storage, read_write> velocity: array<f32>;
 @group(1) @binding(WRITES + 1u) var<storage, read_write> quanta: array<i32>;
 @group(1) @binding(WRITES + 2u) var<storage, read_write> remainder: array<f32>;
+#if WORKS
+// Works, a plane each: of damping, of inertia, of gravity, as far as they are there.
 @group(1) @binding(WRITES + 3u) var<storage, read_write> work: array<f32>;
+#endif
+#if DAMPING
+const INERTIA_PLANE: u32 = 1u;
+#else
+const INERTIA_PLANE: u32 = 0u;
+#endif
+#if INERTIA
+const LAST_PLANE: u32 = INERTIA_PLANE + 1u;
+#else
+const LAST_PLANE: u32 = INERTIA_PLANE;
+#endif
 
 fn integrate(node: u32) {
-    let plane = arrayLength(&mass);
+    let plane = arrayLength(&acceleration) / 3u;
+#if DAMPING
     let damping = select(row.damping_thread, row.damping_solid, node < params.first_thread);
     let keep_gain = factors(damping, row.dt_mid);
+    var damped = 0.0;
+#endif
+#if WORKS
     let own_mass = mass[node];
-    // what acts beyond the true mass: added mass, and the inertia of fibre lines
+    // what acts beyond the true mass
     var extra = 0.0;
+#endif
+#if MASS_ADDED
     if inverse_mass[node] != 0.0 {
         extra = 1.0 / inverse_mass[node] - own_mass;
     }
+#endif
+#if INERTIA
+    var inertia = 0.0;
+#endif
 #if GRAVITY
     let gravity = vec3<f32>(params.gravity_x, params.gravity_y, params.gravity_z);
     var fallen = 0.0;
 #endif
-    var damped = 0.0;
-    var inertia = 0.0;
     for (var k = 0u; k < 3u; k++) {
         let at = node + k * plane;
         var a = acceleration[at];
+#if INERTIA
         var virtual_force = 0.0;
+#endif
 #if LINES
         let c = correction[at];
         a = a + c;
@@ -61,13 +96,25 @@ fn integrate(node: u32) {
 #if GRAVITY
         a = a + gravity[k];
 #endif
+#if MASS_ADDED
         virtual_force = virtual_force - extra * a;
+#endif
         let v = velocity[at];
+#if DAMPING
         let new_v = v * keep_gain.x + a * keep_gain.y;
-        let mean = 0.5 * (v + new_v);
+#else
+        let new_v = v + a * row.dt_mid;
+#endif
         velocity[at] = new_v;
+#if WORKS
+        let mean = 0.5 * (v + new_v);
+#endif
+#if DAMPING
         damped = damped + own_mass * damping * mean * mean * row.dt_mid;
+#endif
+#if INERTIA
         inertia = inertia + virtual_force * mean * row.dt_mid;
+#endif
 #if GRAVITY
         fallen = fallen + (own_mass + extra) * gravity[k] * mean * row.dt_mid;
 #endif
@@ -75,10 +122,14 @@ fn integrate(node: u32) {
         quanta[at] = carry(quanta[at], &r);
         remainder[at] = r;
     }
+#if DAMPING
     work[node] = work[node] + damped;
-    work[node + plane] = work[node + plane] + inertia;
+#endif
+#if INERTIA
+    work[node + INERTIA_PLANE * plane] = work[node + INERTIA_PLANE * plane] + inertia;
+#endif
 #if GRAVITY
-    work[node + 2u * plane] = work[node + 2u * plane] + fallen;
+    work[node + LAST_PLANE * plane] = work[node + LAST_PLANE * plane] + fallen;
 #endif
 }
 #endif

@@ -5,7 +5,7 @@
 #include "kernel/vector"
 
 // Numbers of a beam in the table.
-const TABLE: u32 = 6u;
+const TABLE: u32 = 5u;
 
 // A beam's reference vector and its change, mm.
 struct Beam {
@@ -17,7 +17,11 @@ fn vector(beam: u32) -> Beam {
     let at = TABLE * beam;
     let reference = vec3<f32>(beams[at], beams[at + 1u], beams[at + 2u]);
     let fluctuation = displacement_between(ends[2u * beam + 1u], ends[2u * beam]);
+#if PERIODIC
     return Beam(reference, apply(gradient(), reference) + fluctuation);
+#else
+    return Beam(reference, fluctuation);
+#endif
 }
 
 #if PERIODIC
@@ -40,28 +44,43 @@ fn add_row(at: u32, row: vec3<f32>) {
 @group(1) @binding(1) var<storage, read> beams: array<f32>;
 @group(1) @binding(2) var<storage, read> quanta: array<i32>;
 @group(1) @binding(3) var<storage, read> remainder: array<f32>;
-@group(1) @binding(4) var<storage, read_write> forces: array<f32>;
-@group(1) @binding(5) var<storage, read_write> tensions: array<f32>;
-@group(1) @binding(6) var<storage, read_write> work: array<f32>;
+#if THERMAL
+@group(1) @binding(4) var<storage, read> thermal_strain: array<f32>;
+const WRITES: u32 = 5u;
+#else
+const WRITES: u32 = 4u;
+#endif
+@group(1) @binding(WRITES) var<storage, read_write> forces: array<f32>;
+@group(1) @binding(WRITES + 1u) var<storage, read_write> tensions: array<f32>;
 #if PERIODIC
-@group(1) @binding(7) var<storage, read_write> virial: array<f32>;
+@group(1) @binding(WRITES + 2u) var<storage, read_write> virial: array<f32>;
+const WORK: u32 = WRITES + 3u;
+#else
+const WORK: u32 = WRITES + 2u;
+#endif
+#if THERMAL
+@group(1) @binding(WORK) var<storage, read_write> work: array<f32>;
 #endif
 
 fn force(beam: u32) {
     let b = vector(beam);
     let rest = beams[TABLE * beam + 3u];
     let axial = beams[TABLE * beam + 4u];
-    let thermal = beams[TABLE * beam + 5u];
     let current = b.reference + b.change;
     let length = norm(current);
-    let strain = (2.0 * dot(b.reference, b.change) + dot(b.change, b.change)) / (rest * (length + rest));
-    let tension = axial * (strain - thermal * row.thermal);
+    var strain = (2.0 * dot(b.reference, b.change) + dot(b.change, b.change)) / (rest * (length + rest));
+#if THERMAL
+    strain = strain - thermal_strain[beam] * row.thermal;
+#endif
+    let tension = axial * strain;
     let along = current * (tension / length);
     forces[3u * beam] = along.x;
     forces[3u * beam + 1u] = along.y;
     forces[3u * beam + 2u] = along.z;
     tensions[beam] = tension;
-    work[beam] = work[beam] - tension * rest * thermal * row.thermal_increment;
+#if THERMAL
+    work[beam] = work[beam] - tension * rest * thermal_strain[beam] * row.thermal_increment;
+#endif
 #if PERIODIC
     add_virial(beam, along, b.reference);
 #endif

@@ -1,4 +1,4 @@
-// The row of schedule data of one time step. Units: mm, s.
+// The row of schedule data of one time step. Units: mm, s. The rate of F̄ is for periodic scenes.
 
 struct Row {
     gradient_xx: f32,
@@ -42,6 +42,7 @@ fn gradient() -> array<vec3<f32>, 3> {
     );
 }
 
+#if PERIODIC
 // The rate of F̄ over the last half step, 1/s; element [i] is row i.
 fn rate() -> array<vec3<f32>, 3> {
     return array<vec3<f32>, 3>(
@@ -50,3 +51,4 @@ fn rate() -> array<vec3<f32>, 3> {
         vec3<f32>(row.rate_zx, row.rate_zy, row.rate_zz),
     );
 }
+#endif

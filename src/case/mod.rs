@@ -3,6 +3,7 @@
 pub mod check;
 pub mod conform;
 pub mod defaults;
+pub mod differences;
 pub mod domain;
 pub mod effects;
 pub mod expect;

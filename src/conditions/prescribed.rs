@@ -2,7 +2,7 @@
 
 use crate::dynamics::integrate::factors;
 use crate::kernel::lane::{Lane, Real};
-use crate::kernel::shader::Shader;
+use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
@@ -30,13 +30,16 @@ const WORK: usize = 6;
 /// Force that the scene exerts on the prescribed components, N (3).
 const REACTION: usize = 7;
 
-/// Replaces accelerations of prescribed components, before fibre lines see them.
-pub struct Prescribed;
+/// Replaces accelerations of prescribed components, before fibre lines see them; `GRAVITY` and `DAMPING` as for the integration.
+pub struct Prescribed<const GRAVITY: bool, const DAMPING: bool>;
 /// Takes back what fibre lines did to prescribed components.
 pub struct Hold;
 
-impl Kernel for Prescribed {
-    const SHADER: Shader = Shader::new("conditions/prescribed", "prescribed");
+impl<const GRAVITY: bool, const DAMPING: bool> Kernel for Prescribed<GRAVITY, DAMPING> {
+    const SHADER: Shader = Shader {
+        defines: &[when(GRAVITY, "GRAVITY"), when(DAMPING, "DAMPING")],
+        ..Shader::new("conditions/prescribed", "prescribed")
+    };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -53,7 +56,7 @@ impl Kernel for Prescribed {
         for item in items {
             let (node, mask) = (nodes[2 * item] as usize, nodes[2 * item + 1]);
             let damping = if node < first_thread as usize { row.damping_solid } else { row.damping_thread };
-            let (keep, gain) = factors(damping, row.dt_mid);
+            let (keep, gain) = factors::<_, DAMPING>(damping, row.dt_mid);
             for k in 0..3 {
                 if mask >> k & 1 == 0 {
                     continue;
@@ -61,7 +64,10 @@ impl Kernel for Prescribed {
                 let (place, v) = (node + k * plane, velocity[node + k * plane]);
                 let force = acceleration.get(place) / inverse.get(node);
                 let target = targets[3 * item + k] * row.motion;
-                let a = (target - v * keep) / gain - L::Scalar::from_f64(f64::from(gravity[k]));
+                let mut a = (target - v * keep) / gain;
+                if GRAVITY {
+                    a = a - L::Scalar::from_f64(f64::from(gravity[k]));
+                }
                 acceleration.set(place, a);
                 let mean = (v + target) * L::Scalar::from_f64(0.5);
                 // a node that is held altogether carries no added mass

@@ -2,16 +2,16 @@
 //!
 //! Among the faces of a body the closest one in front of which the slave lies wins; one behind which it lies only if it is
 //! clearly closer, since at a sharp edge the slave is behind the neighbouring face without being inside the body. A
-//! candidate that was known keeps its friction, and its face while it touches.
+//! candidate that was known keeps its state, and its face while it touches.
 
 use super::face::{Place, Surface, closest};
 use super::grid::{BOX, SLAB, SLAB_FACES, absolute, cell_index, cells, inverse};
-use super::penalty::{SLAVE, SLAVE_VALUES, SLOT_KEYS, SLOT_STATE};
-use super::{EMPTY, Params, key, status};
+use super::penalty::{SLAVE, SLAVE_VALUES, SLOT_KEYS};
+use super::{EMPTY, MOST_STATE, Params, key, status};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::QUANTUM;
-use crate::kernel::shader::Shader;
+use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{add, norm, scale, sub};
 use std::ops::Range;
@@ -37,8 +37,8 @@ const MOST: usize = 16;
 /// A face behind which the slave lies must be closer than one in front by this, mm.
 const CLEARLY: f64 = 0.01;
 
-/// The search.
-pub struct Candidates;
+/// The search, for the nodes of threads (`THREAD`) or of yarn surfaces.
+pub struct Candidates<const THREAD: bool, const PERIODIC: bool>;
 
 /// The best faces of one body found so far.
 #[derive(Clone, Copy)]
@@ -48,14 +48,17 @@ struct Best<R> {
     behind: (R, Place),
 }
 
-impl Kernel for Candidates {
-    const SHADER: Shader = Shader::new("contact/candidates", "candidates");
+impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PERIODIC> {
+    const SHADER: Shader = Shader {
+        defines: &[when(THREAD, "THREAD"), when(PERIODIC, "PERIODIC")],
+        ..Shader::new("contact/candidates", "candidates")
+    };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();
         let constant = L::Scalar::from_f64;
-        let surface = Surface {
+        let surface = Surface::<_, PERIODIC> {
             bodies: bytemuck::cast_slice(io.uints(BODIES)),
             ring_lines: io.uints(RING_LINES),
             reference: Lattice::new(io, REFERENCE),
@@ -63,7 +66,7 @@ impl Kernel for Candidates {
             gradient: &io.row.gradient,
             period: params.period,
         };
-        let inverse = inverse(&io.row.gradient);
+        let inverse = inverse::<_, PERIODIC>(&io.row.gradient);
         let stretch = [0, 1].map(|k| (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt());
         let (slaves, values, slabs) = (io.uints(SLAVES), io.scalars(VALUES), io.uints(SLABS));
         let (counts, lists, boxes) = (io.uints(COUNTS), io.uints(ITEMS), io.scalars(BOXES));
@@ -76,14 +79,13 @@ impl Kernel for Candidates {
         for item in items {
             let slave = slaves[SLAVE * item] as usize;
             let own = slaves[SLAVE * item + 1];
-            let is_thread = own == EMPTY;
             let reach = values[SLAVE_VALUES * item + 1] + constant(f64::from(params.skin));
             let (position, height) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, slave);
             let mut found = [Best { key: EMPTY, in_front: (far, nowhere), behind: (far, nowhere) }; MOST];
             let mut count = 0;
             if position[0].is_finite() && position[1].is_finite() && height.is_finite() {
-                let (x, _) = cells(&params, 0, position[0], position[0]);
-                let (y, _) = cells(&params, 1, position[1], position[1]);
+                let (x, _) = cells::<_, PERIODIC>(&params, 0, position[0], position[0]);
+                let (y, _) = cells::<_, PERIODIC>(&params, 1, position[1], position[1]);
                 let cell = cell_index(&params, x, y);
                 let listed = counts[cell].min(params.capacity) as usize;
                 for &near in &lists[cell * params.capacity as usize..][..listed] {
@@ -93,11 +95,12 @@ impl Kernel for Candidates {
                     let [body, slice, first] = [0, 1, 2].map(|k| slabs[SLAB * near as usize + k]);
                     let (slice, first) = (slice as i32, first as i32);
                     let bounds = &boxes[BOX * near as usize..][..BOX];
-                    if body == own || height < bounds[2] - reach || height > bounds[3] + reach {
+                    if !THREAD && body == own || height < bounds[2] - reach || height > bounds[3] + reach {
                         continue;
                     }
                     let image = [0, 1].map(|k| {
-                        if params.period[k] == 0 { 0 } else { ((position[k] - bounds[k]) / period[k]).to_i32() }
+                        let repeats = PERIODIC && params.period[k] != 0;
+                        if repeats { ((position[k] - bounds[k]) / period[k]).to_i32() } else { 0 }
                     });
                     let beside = |k: usize| {
                         let from = position[k] - bounds[k] - L::Scalar::from_i32(image[k]) * period[k];
@@ -108,7 +111,7 @@ impl Kernel for Candidates {
                     }
                     // a closed yarn goes on through its own images: count its slices on instead
                     let b = surface.bodies[body as usize];
-                    let turns = image[0] * b.wrap[0] + image[1] * b.wrap[1];
+                    let turns = if PERIODIC { image[0] * b.wrap[0] + image[1] * b.wrap[1] } else { 0 };
                     let lateral = [image[0] - turns * b.wrap[0], image[1] - turns * b.wrap[1]];
                     let slice = slice + turns * b.slices as i32;
                     let key = key(body as usize, lateral);
@@ -137,10 +140,10 @@ impl Kernel for Candidates {
                         if point.distance > reach {
                             continue;
                         }
-                        let in_front = point.height() >= constant(0.0) || is_thread && !point.interior;
+                        let in_front = point.height() >= constant(0.0) || THREAD && !point.interior;
                         if in_front {
                             best.in_front = nearer(best.in_front, (point.distance, place(ring)));
-                        } else if point.normal_and_distance(is_thread).is_some() {
+                        } else if point.normal_and_distance(THREAD).is_some() {
                             best.behind = nearer(best.behind, (point.distance, place(ring)));
                         }
                     }
@@ -170,7 +173,7 @@ impl Kernel for Candidates {
                 flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
             }
             let kept = found.len().min(params.slots as usize);
-            merge(keys.item(0, item), states.item(0, item), &found[..kept]);
+            merge(keys.item(0, item), states.item(0, item), params.state as usize, &found[..kept]);
         }
     }
 }
@@ -182,19 +185,20 @@ fn nearer<R: Real>(a: (R, Place), b: (R, Place)) -> (R, Place) {
     if b.0 < a.0 || b.0 == a.0 && order(b.1) < order(a.1) { b } else { a }
 }
 
-/// Writes new candidates into the slots; known ones keep their friction, and their face while they touch.
+/// Writes new candidates into the slots of `state` numbers; known ones keep these, and their face while they touch.
 #[inline(always)]
-fn merge<R: Real>(keys: &mut [u32], states: &mut [R], found: &[Best<R>]) {
+fn merge<R: Real>(keys: &mut [u32], states: &mut [R], state: usize, found: &[Best<R>]) {
     let zero = R::from_f64(0.0);
-    let mut old = [(EMPTY, 0u32, 0u32, [zero; SLOT_STATE]); MOST];
+    let mut old = [(EMPTY, 0u32, 0u32, [zero; MOST_STATE]); MOST];
     let slots = keys.len() / SLOT_KEYS;
     let known = slots.min(MOST);
     for (slot, old) in old[..known].iter_mut().enumerate() {
-        let (k, s) = (&keys[SLOT_KEYS * slot..], &states[SLOT_STATE * slot..]);
-        *old = (k[0], k[1], k[2], [s[0], s[1], s[2], s[3]]);
+        let k = &keys[SLOT_KEYS * slot..];
+        (old.0, old.1, old.2) = (k[0], k[1], k[2]);
+        old.3[..state].copy_from_slice(&states[state * slot..][..state]);
     }
     for slot in 0..slots {
-        let (k, s) = (&mut keys[SLOT_KEYS * slot..][..SLOT_KEYS], &mut states[SLOT_STATE * slot..][..SLOT_STATE]);
+        let (k, s) = (&mut keys[SLOT_KEYS * slot..][..SLOT_KEYS], &mut states[state * slot..][..state]);
         let Some(best) = found.get(slot) else {
             k.fill(EMPTY);
             s.fill(zero);
@@ -202,14 +206,14 @@ fn merge<R: Real>(keys: &mut [u32], states: &mut [R], found: &[Best<R>]) {
         };
         let clearly = best.behind.0 + R::from_f64(CLEARLY);
         let place = if clearly < best.in_front.0 { best.behind.1 } else { best.in_front.1 };
-        let mut now = (best.key, place.ring as u32, place.slice as u32, [zero; SLOT_STATE]);
+        let mut now = (best.key, place.ring as u32, place.slice as u32, [zero; MOST_STATE]);
         if let Some(old) = old[..known].iter().find(|old| old.0 == best.key) {
             now.3 = old.3;
-            if old.3[3] > zero {
+            if old.3[0] > zero {
                 (now.1, now.2) = (old.1, old.2);
             }
         }
         k.copy_from_slice(&[now.0, now.1, now.2]);
-        s.copy_from_slice(&now.3);
+        s.copy_from_slice(&now.3[..state]);
     }
 }

@@ -5,8 +5,8 @@ use crate::kernel::lane::Real;
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::vector::{Vector, add, apply, cross, dot, fma, norm, scale, sub};
 
-/// Geometry that all faces share.
-pub struct Surface<'a, R> {
+/// Geometry that all faces share. Without `PERIODIC` there are no images, and bodies are open.
+pub struct Surface<'a, R, const PERIODIC: bool> {
     pub bodies: &'a [Body],
     /// First node of the fibre line at each ring position of each body.
     pub ring_lines: &'a [u32],
@@ -48,7 +48,7 @@ pub struct Closest<R> {
     pub interior: bool,
 }
 
-impl<R: Real> Surface<'_, R> {
+impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
     /// A node of a body's surface, and its image shift in quanta.
     #[inline(always)]
     pub fn node(&self, body: usize, image: [i32; 2], place: Place) -> (usize, [i32; 2]) {
@@ -56,20 +56,33 @@ impl<R: Real> Surface<'_, R> {
         let line = self.ring_lines[(b.ring_start + place.ring.rem_euclid(b.ring as i32) as u32) as usize] as usize;
         let mut image = image;
         let mut slice = place.slice;
-        if b.closed == 1 {
+        if self.is_closed(body) {
             let turns = slice.div_euclid(b.slices as i32);
             slice -= turns * b.slices as i32;
             image = [image[0] + turns * b.wrap[0], image[1] + turns * b.wrap[1]];
         }
-        (line + slice as usize, [image[0].wrapping_mul(self.period[0]), image[1].wrapping_mul(self.period[1])])
+        let shift = if PERIODIC { [0, 1].map(|k| image[k].wrapping_mul(self.period[k])) } else { [0; 2] };
+        (line + slice as usize, shift)
+    }
+
+    /// Whether a slice of faces is on a body.
+    #[inline(always)]
+    pub fn has_slice(&self, body: usize, slice: i32) -> bool {
+        self.is_closed(body) || (0..self.bodies[body].slices as i32).contains(&slice)
+    }
+
+    /// Whether the last slice of a body is followed by the first.
+    #[inline(always)]
+    pub fn is_closed(&self, body: usize) -> bool {
+        PERIODIC && self.bodies[body].closed == 1
     }
 
     /// Reference and current position of a surface node relative to the slave node.
     #[inline(always)]
     pub fn from_slave(&self, slave: usize, node: usize, shift: [i32; 2]) -> (Vector<R>, Vector<R>) {
         let rest: Vector<R> = self.reference.between(node, slave, shift);
-        let current = add(add(rest, apply(self.gradient, rest)), self.displacement.between(node, slave));
-        (rest, current)
+        let affine = if PERIODIC { add(rest, apply(self.gradient, rest)) } else { rest };
+        (rest, add(affine, self.displacement.between(node, slave)))
     }
 
     /// The corners of a face.
@@ -111,7 +124,7 @@ impl<R: Real> Surface<'_, R> {
                     next.ring += step;
                 } else {
                     next.slice += step;
-                    if b.closed == 0 && !(0..b.slices as i32).contains(&next.slice) {
+                    if !self.has_slice(body, next.slice) {
                         continue;
                     }
                 }
@@ -142,7 +155,7 @@ pub struct Near<R> {
     pub faces: [(Corners<R>, Closest<R>); MOST_TOUCHED],
 }
 
-impl<R: Real> Surface<'_, R> {
+impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
     /// All faces within `reach` (mm) of the slave, the closest one first, found by spreading from it.
     ///
     /// Each keeps its own distance, whether its inside, edge or corner is closest: the sum of their penalties is an energy
@@ -165,7 +178,7 @@ impl<R: Real> Surface<'_, R> {
         let mut near = Near { count: 1, faces: [first; MOST_TOUCHED] };
         // around the ring, as long as faces are near; then the same in the slices before and after
         for slice in [0, -1, 1] {
-            if b.closed == 0 && !(0..b.slices as i32).contains(&(place.slice + slice)) {
+            if !self.has_slice(body, place.slice + slice) {
                 continue;
             }
             if slice != 0 {

@@ -10,10 +10,10 @@ use crate::elements::beam2;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::QUANTUM;
-use crate::kernel::shader::Shader;
-use crate::kernel::stage::{Io, Kernel};
+use crate::kernel::shader::{Shader, when};
+use crate::kernel::stage::{Io, Kernel, Own, Scatter};
 use std::ops::Range;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm, half sizes in the plane, mm (2).
 pub const BOX: usize = 6;
@@ -24,24 +24,23 @@ pub const SLAB_FACES: usize = 8;
 /// More than rounding moves a place in the plane, mm: an item must not be in too few cells.
 const ROUNDING: f64 = 1e-4;
 
+pub const REFERENCE: usize = 0;
+pub const QUANTA: usize = 1;
+pub const REMAINDER: usize = 2;
 /// See [`SLAB`].
-pub const SLABS: usize = 0;
-pub const BODIES: usize = 1;
-pub const RING_LINES: usize = 2;
-pub const REFERENCE: usize = 3;
-pub const QUANTA: usize = 4;
-pub const REMAINDER: usize = 5;
-pub const ENDS: usize = 6;
-pub const BEAMS: usize = 7;
-const COUNTS: usize = 8;
-const ITEMS: usize = 9;
-const BOXES: usize = 10;
-const STATUS: usize = 11;
+pub const SLABS: usize = 3;
+pub const BODIES: usize = 4;
+pub const RING_LINES: usize = 5;
+/// Of beams, where those of slabs are.
+pub const ENDS: usize = 3;
+pub const BEAMS: usize = 4;
 
 /// Empties the cells.
 pub struct Clear;
-/// Puts slabs and beams into cells.
-pub struct Fill;
+/// Puts slabs of yarns into cells.
+pub struct FillSlabs<const PERIODIC: bool>;
+/// Puts beams into cells.
+pub struct FillBeams<const PERIODIC: bool>;
 
 impl Kernel for Clear {
     const SHADER: Shader = Shader::new("contact/grid", "clear");
@@ -57,8 +56,11 @@ impl Kernel for Clear {
 
 /// The in-plane inverse of F̄.
 #[inline(always)]
-pub fn inverse<R: Real>(gradient: &[[R; 3]; 3]) -> [[R; 2]; 2] {
-    let one = R::from_f64(1.0);
+pub fn inverse<R: Real, const PERIODIC: bool>(gradient: &[[R; 3]; 3]) -> [[R; 2]; 2] {
+    let (zero, one) = (R::from_f64(0.0), R::from_f64(1.0));
+    if !PERIODIC {
+        return [[one, zero], [zero, one]];
+    }
     let (a, b, c, d) = (one + gradient[0][0], gradient[0][1], gradient[1][0], one + gradient[1][1]);
     let scale = one / (a * d - b * c);
     [[d * scale, -(b * scale)], [-(c * scale), a * scale]]
@@ -84,7 +86,7 @@ pub fn absolute<R: Real>(io: &Io<R>, bindings: [usize; 3], inverse: &[[R; 2]; 2]
 
 /// First and last cell along one axis for an interval of the pulled-back plane; the last may lie behind the first by whole periods.
 #[inline(always)]
-pub fn cells<R: Real>(params: &Params, axis: usize, low: R, high: R) -> (i32, i32) {
+pub fn cells<R: Real, const PERIODIC: bool>(params: &Params, axis: usize, low: R, high: R) -> (i32, i32) {
     let real = |x: f32| R::from_f64(f64::from(x));
     let cell = |x: R| {
         let x = ((x - real(params.origin[axis])) / real(params.cell[axis])).max(real(-1e6)).min(real(1e6));
@@ -92,7 +94,7 @@ pub fn cells<R: Real>(params: &Params, axis: usize, low: R, high: R) -> (i32, i3
         near - i32::from(x < R::from_i32(near))
     };
     let (low, high, count) = (cell(low), cell(high), params.cells[axis] as i32);
-    if params.period[axis] != 0 {
+    if PERIODIC && params.period[axis] != 0 {
         (low, high.min(low + count - 1))
     } else {
         (low.clamp(0, count - 1), high.clamp(0, count - 1))
@@ -106,83 +108,141 @@ pub fn cell_index(params: &Params, x: i32, y: i32) -> usize {
     (y.rem_euclid(ny) * nx + x.rem_euclid(nx)) as usize
 }
 
-impl Kernel for Fill {
-    const SHADER: Shader = Shader::new("contact/grid", "fill");
+/// The box of an item in the pulled-back plane and in height, from its first node, mm.
+struct Bounds<R> {
+    low: [R; 3],
+    high: [R; 3],
+}
+
+impl<R: Real> Bounds<R> {
+    /// The first node alone.
+    #[inline(always)]
+    fn new() -> Self {
+        Self { low: [R::from_f64(0.0); 3], high: [R::from_f64(0.0); 3] }
+    }
+
+    /// With the end of a vector from the first node.
+    #[inline(always)]
+    fn grow(&mut self, inverse: &[[R; 2]; 2], v: [R; 3]) {
+        let back = pull_back(inverse, v);
+        for (k, x) in [back[0], back[1], v[2]].into_iter().enumerate() {
+            self.low[k] = self.low[k].min(x);
+            self.high[k] = self.high[k].max(x);
+        }
+    }
+}
+
+/// Where the grid's items go.
+struct Grid<'a, R> {
+    params: Params,
+    inverse: [[R; 2]; 2],
+    counts: &'a [AtomicU32],
+    lists: Scatter<'a, u32>,
+    boxes: Own<'a, R>,
+    flags: &'a [AtomicU32],
+}
+
+impl<'a, R: Real> Grid<'a, R> {
+    /// Writes of a kernel: counts, lists, boxes and status.
+    #[inline(always)]
+    fn new<const PERIODIC: bool>(io: &'a Io<R>, first: usize) -> Self {
+        Self {
+            params: io.params(),
+            inverse: inverse::<R, PERIODIC>(&io.row.gradient),
+            counts: io.atomic_uints(first),
+            lists: io.scatter(first + 1),
+            boxes: io.own(first + 2),
+            flags: io.atomic_uints(first + 3),
+        }
+    }
+
+    /// Puts an item into every cell that its box touches, `reach` (mm) around.
+    #[inline(always)]
+    fn put<const PERIODIC: bool>(&mut self, io: &Io<R>, item: usize, origin: usize, bounds: Bounds<R>, reach: R) {
+        let Self { params, inverse, counts, lists, boxes, flags } = self;
+        let Bounds { low, high } = bounds;
+        let (base, height) = absolute(io, [REFERENCE, QUANTA, REMAINDER], inverse, origin);
+        let half = R::from_f64(0.5);
+        boxes.item(0, item).copy_from_slice(&[
+            base[0] + half * (low[0] + high[0]),
+            base[1] + half * (low[1] + high[1]),
+            height + low[2],
+            height + high[2],
+            half * (high[0] - low[0]),
+            half * (high[1] - low[1]),
+        ]);
+        let range = |k: usize| {
+            let reach = reach * (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt();
+            let room = reach + R::from_f64(ROUNDING);
+            cells::<R, PERIODIC>(params, k, base[k] + low[k] - room, base[k] + high[k] + room)
+        };
+        let ((x0, x1), (y0, y1)) = (range(0), range(1));
+        for y in y0..=y1 {
+            for x in x0..=x1 {
+                let cell = cell_index(params, x, y);
+                let place = counts[cell].fetch_add(1, Ordering::Relaxed);
+                if place < params.capacity {
+                    lists.set(cell * params.capacity as usize + place as usize, item as u32);
+                } else {
+                    flags[status::FLAGS].fetch_or(status::CELL_FULL, Ordering::Relaxed);
+                }
+            }
+        }
+    }
+}
+
+impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
+    const SHADER: Shader =
+        Shader { defines: &[when(PERIODIC, "PERIODIC")], ..Shader::new("contact/grid", "fill_slabs") };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let params: Params = io.params();
-        let real = |x: f32| L::Scalar::from_f64(f64::from(x));
-        let (counts, flags) = (io.atomic_uints(COUNTS), io.atomic_uints(STATUS));
-        let mut lists = io.scatter::<u32>(ITEMS);
-        let mut boxes = io.own::<L::Scalar>(BOXES);
-        let inverse = inverse(&io.row.gradient);
-        let surface = Surface {
+        let mut grid = Grid::new::<PERIODIC>(io, 6);
+        let inverse = grid.inverse;
+        let surface = Surface::<_, PERIODIC> {
             bodies: bytemuck::cast_slice(io.uints(BODIES)),
             ring_lines: io.uints(RING_LINES),
             reference: Lattice::new(io, REFERENCE),
             displacement: Displacements::new(io, QUANTA, REMAINDER),
             gradient: &io.row.gradient,
-            period: params.period,
+            period: grid.params.period,
         };
-        let (slabs, ends, beams) = (io.uints(SLABS), io.uints(ENDS), io.scalars(BEAMS));
+        let slabs = io.uints(SLABS);
+        let reach = L::Scalar::from_f64(f64::from(grid.params.thread_radius + grid.params.skin));
         for item in items {
-            let origin;
-            let mut low = [L::Scalar::from_f64(0.0); 3];
-            let mut high = low;
-            let mut grow = |v: [L::Scalar; 3]| {
-                let back = pull_back(&inverse, v);
-                for (k, x) in [back[0], back[1], v[2]].into_iter().enumerate() {
-                    low[k] = low[k].min(x);
-                    high[k] = high[k].max(x);
-                }
-            };
-            let reach = if item < params.slabs as usize {
-                let [body, slice, first] = [0, 1, 2].map(|k| slabs[SLAB * item + k]);
-                let (body, slice, first) = (body as usize, slice as i32, first as i32);
-                origin = surface.node(body, [0, 0], Place { ring: first, slice }).0;
-                let last = (first + SLAB_FACES as i32).min(surface.bodies[body].ring as i32);
-                for ring in first..=last {
-                    for slice in [slice, slice + 1] {
-                        let (node, shift) = surface.node(body, [0, 0], Place { ring, slice });
-                        grow(surface.from_slave(origin, node, shift).1);
-                    }
-                }
-                real(params.thread_radius + params.skin)
-            } else {
-                let beam = item - params.slabs as usize;
-                origin = ends[2 * beam] as usize;
-                let (d, change) = beam2::vector(beams, ends, beam, &surface.displacement, &io.row.gradient);
-                grow([d[0] + change[0], d[1] + change[1], d[2] + change[2]]);
-                real(2.0 * params.thread_radius + params.skin)
-            };
-            let (base, height) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, origin);
-            let half = L::Scalar::from_f64(0.5);
-            boxes.item(0, item).copy_from_slice(&[
-                base[0] + half * (low[0] + high[0]),
-                base[1] + half * (low[1] + high[1]),
-                height + low[2],
-                height + high[2],
-                half * (high[0] - low[0]),
-                half * (high[1] - low[1]),
-            ]);
-            let range = |k: usize| {
-                let reach = reach * (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt();
-                let room = reach + L::Scalar::from_f64(ROUNDING);
-                cells(&params, k, base[k] + low[k] - room, base[k] + high[k] + room)
-            };
-            let ((x0, x1), (y0, y1)) = (range(0), range(1));
-            for y in y0..=y1 {
-                for x in x0..=x1 {
-                    let cell = cell_index(&params, x, y);
-                    let place = counts[cell].fetch_add(1, Ordering::Relaxed);
-                    if place < params.capacity {
-                        lists.set(cell * params.capacity as usize + place as usize, item as u32);
-                    } else {
-                        flags[status::FLAGS].fetch_or(status::CELL_FULL, Ordering::Relaxed);
-                    }
+            let [body, slice, first] = [0, 1, 2].map(|k| slabs[SLAB * item + k]);
+            let (body, slice, first) = (body as usize, slice as i32, first as i32);
+            let origin = surface.node(body, [0, 0], Place { ring: first, slice }).0;
+            let last = (first + SLAB_FACES as i32).min(surface.bodies[body].ring as i32);
+            let mut bounds = Bounds::new();
+            for ring in first..=last {
+                for slice in [slice, slice + 1] {
+                    let (node, shift) = surface.node(body, [0, 0], Place { ring, slice });
+                    bounds.grow(&inverse, surface.from_slave(origin, node, shift).1);
                 }
             }
+            grid.put::<PERIODIC>(io, item, origin, bounds, reach);
+        }
+    }
+}
+
+impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
+    const SHADER: Shader =
+        Shader { defines: &[when(PERIODIC, "PERIODIC")], ..Shader::new("contact/grid", "fill_beams") };
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let mut grid = Grid::new::<PERIODIC>(io, 5);
+        let inverse = grid.inverse;
+        let displacement = Displacements::new(io, QUANTA, REMAINDER);
+        let (ends, beams) = (io.uints(ENDS), io.scalars(BEAMS));
+        let reach = L::Scalar::from_f64(f64::from(2.0 * grid.params.thread_radius + grid.params.skin));
+        for item in items {
+            let beam = item - grid.params.slabs as usize;
+            let (d, change) = beam2::vector::<_, PERIODIC>(beams, ends, beam, &displacement, &io.row.gradient);
+            let mut bounds = Bounds::new();
+            bounds.grow(&inverse, [d[0] + change[0], d[1] + change[1], d[2] + change[2]]);
+            grid.put::<PERIODIC>(io, item, ends[2 * beam] as usize, bounds, reach);
         }
     }
 }

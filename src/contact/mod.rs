@@ -1,5 +1,7 @@
 //! Contact: nodes of threads and of yarn surfaces against the structured surfaces of other yarns, and beams against beams.
 //!
+//! A scene has the kinds of pairs that it calls for, each with stages of its own, and friction only if something rubs.
+//!
 //! `grid` sorts slabs of yarns and beams into cells, `candidates` finds for each slave which bodies are near and at which
 //! face, and every step `penalty` walks from the last face to the closest one, over a surface that is a grid of
 //! rings and slices. `threads` does the same for pairs of beams. Forces and contact stiffness are added as integers, so
@@ -75,7 +77,17 @@ pub struct Params {
     pub self_arc: f32,
     /// Deepest penetration of a surface node that is still pushed out, mm.
     pub depth: f32,
+    /// Numbers that a slot keeps, see [`slot_state`].
+    pub state: u32,
 }
+
+/// Numbers of a slot: normal force, N, or less what is sure to be left of the gap, mm; with friction then the elastic tangential
+/// displacement, mm (3).
+pub const fn slot_state(friction: bool) -> usize {
+    if friction { 4 } else { 1 }
+}
+/// Most numbers of a slot.
+pub const MOST_STATE: usize = slot_state(true);
 
 /// No candidate in a slot.
 pub const EMPTY: u32 = u32::MAX;

@@ -3,11 +3,11 @@
 
 use super::face::{Place, Surface};
 use super::friction::slide;
-use super::{BODY, EMPTY, Params, add_pair, add_stiffness, of_key, status};
+use super::{BODY, EMPTY, Params, add_pair, add_stiffness, of_key, slot_state, status};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::row::Row;
-use crate::kernel::shader::Shader;
+use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
 use std::ops::Range;
@@ -19,17 +19,23 @@ pub const SLAVE: usize = 2;
 pub const SLAVE_VALUES: usize = 2;
 /// Integers of a slot: key, ring position, slice.
 pub const SLOT_KEYS: usize = 3;
-/// Numbers of a slot: elastic tangential displacement, mm (3); normal force, N, or less what is sure to be left of the gap, mm.
-pub const SLOT_STATE: usize = 4;
-/// Sums of a slave over steps: work lost to friction, to contact damping, work of the growing radius, mJ; slip, mm; then
-/// force ⊗ ΔX, N·mm (9). Fourteenth: elastic energy now, mJ.
-pub const SUMS: usize = 14;
-pub const SUM_FRICTION: usize = 0;
+/// Sums of a slave or a beam: elastic energy now, mJ; over steps, energy lost to contact damping, and work of the growing
+/// radius, mJ.
+pub const SUM_ENERGY: usize = 0;
 pub const SUM_DAMPING: usize = 1;
 pub const SUM_RADIUS: usize = 2;
-pub const SUM_SLIP: usize = 3;
-pub const SUM_VIRIAL: usize = 4;
-pub const SUM_ENERGY: usize = 13;
+/// With friction: energy lost to it, mJ, and slip, mm.
+pub const SUM_FRICTION: usize = 3;
+pub const SUM_SLIP: usize = 4;
+
+/// Where force ⊗ ΔX, N·mm (9), starts in the sums of a periodic scene.
+pub const fn virial(friction: bool) -> usize {
+    if friction { SUM_SLIP + 1 } else { SUM_RADIUS + 1 }
+}
+/// Number of the sums.
+pub const fn sums(friction: bool, periodic: bool) -> usize {
+    virial(friction) + if periodic { 9 } else { 0 }
+}
 
 pub const SLAVES: usize = 0;
 pub const VALUES: usize = 1;
@@ -55,8 +61,8 @@ pub const AT_REST: f64 = 1e20;
 /// Force that stands for a touch without pressure, N.
 const TOUCH: f64 = 1e-30;
 
-/// Contact forces of slave nodes.
-pub struct Penalty;
+/// Contact forces of the nodes of threads (`THREAD`) or of yarn surfaces on yarns.
+pub struct Penalty<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool>;
 
 /// What presses two bodies apart.
 pub struct Press<R> {
@@ -82,28 +88,32 @@ pub fn press<R: Real>(params: &Params, row: &Row<R>, penalty: R, depth: R, inver
     }
 }
 
-/// Subtracts force ⊗ ΔX from the sum that makes the homogenised stress.
+/// Subtracts force ⊗ ΔX from the nine sums that make the homogenised stress.
 #[inline(always)]
 pub fn add_virial<R: Real>(sum: &mut [R], force: Vector<R>, apart: Vector<R>) {
     for i in 0..3 {
         for j in 0..3 {
-            let v = &mut sum[SUM_VIRIAL + 3 * i + j];
+            let v = &mut sum[3 * i + j];
             *v = *v - force[i] * apart[j];
         }
     }
 }
 
-impl Kernel for Penalty {
-    const SHADER: Shader = Shader::new("contact/penalty", "penalty");
+impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for Penalty<THREAD, FRICTION, PERIODIC> {
+    const SHADER: Shader = Shader {
+        defines: &[when(THREAD, "THREAD"), when(FRICTION, "FRICTION"), when(PERIODIC, "PERIODIC")],
+        ..Shader::new("contact/penalty", "penalty")
+    };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let (state_size, virial) = const { (slot_state(FRICTION), virial(FRICTION)) };
         let params: Params = io.params();
         let slots = params.slots as usize;
         let real = |x: f32| L::Scalar::from_f64(f64::from(x));
         let constant = L::Scalar::from_f64;
         let zero = constant(0.0);
-        let surface = Surface {
+        let surface = Surface::<_, PERIODIC> {
             bodies: bytemuck::cast_slice(io.uints(BODIES)),
             ring_lines: io.uints(RING_LINES),
             reference: Lattice::new(io, REFERENCE),
@@ -125,7 +135,6 @@ impl Kernel for Penalty {
                 continue;
             }
             let slave = slaves[SLAVE * item] as usize;
-            let is_thread = slaves[SLAVE * item + 1] == EMPTY;
             let (penalty, full_radius) = (values[SLAVE_VALUES * item], values[SLAVE_VALUES * item + 1]);
             let radius = full_radius * io.row.radius;
             let closing = io.row.approach * elapsed + full_radius * io.row.radius_increment;
@@ -139,34 +148,32 @@ impl Kernel for Penalty {
                     break;
                 }
                 let (body, image) = of_key(at[0]);
-                let state = &mut slot_states[SLOT_STATE * slot..][..SLOT_STATE];
-                if state[3] < zero {
-                    state[3] = state[3] + closing;
-                    if state[3] < zero {
+                let state = &mut slot_states[state_size * slot..][..state_size];
+                if state[0] < zero {
+                    state[0] = state[0] + closing;
+                    if state[0] < zero {
                         continue;
                     }
                 }
                 let from = Place { ring: at[1] as i32, slice: at[2] as i32 };
                 let (place, corners, point) = surface.walk(slave, body, image, from);
                 (at[1], at[2]) = (place.ring as u32, place.slice as u32);
-                let elastic = [state[0], state[1], state[2]];
-                let tangential = penalty * real(params.tangential);
-                let open = !is_thread && surface.bodies[body].closed == 0;
-                let enters = open && state[3] <= zero && io.row.approach < constant(AT_REST);
+                let open = !THREAD && !surface.is_closed(body);
+                let enters = open && state[0] <= zero && io.row.approach < constant(AT_REST);
                 let (near, single);
-                let faces = if is_thread && point.distance < radius {
+                let faces = if THREAD && point.distance < radius {
                     near = surface.faces_within(slave, body, image, place, (corners, point), radius);
                     &near.faces[..near.count]
                 } else {
                     single = [(corners, point)];
                     &single[..]
                 };
-                // the normal forces of all faces, and what friction needs of the closest one
+                // the normal forces of all faces, and where the closest one is
                 let mut push = [zero; 3];
                 let mut normal_force = zero;
                 let mut first = None;
                 for (corners, point) in faces {
-                    let Some((normal, distance)) = point.normal_and_distance(is_thread) else { continue };
+                    let Some((normal, distance)) = point.normal_and_distance(THREAD) else { continue };
                     let depth = radius - distance;
                     if depth <= zero || -distance >= real(params.depth) {
                         continue;
@@ -180,7 +187,9 @@ impl Kernel for Penalty {
                         apart = fma(corners.reference[a], -weights[a], apart);
                         inverse = inverse + weights[a] * weights[a] / mass[corners.nodes[a]];
                     }
-                    let motion = add(motion, apply(&io.row.rate, apart));
+                    if PERIODIC {
+                        motion = add(motion, apply(&io.row.rate, apart));
+                    }
                     let approach = dot(motion, normal);
                     if enters && depth > constant(ENTRY) - constant(2.0) * approach.min(zero) * elapsed {
                         continue;
@@ -193,40 +202,52 @@ impl Kernel for Penalty {
                     let force = scale(normal, pressing);
                     push = add(push, force);
                     normal_force = normal_force + pressing;
-                    add_virial(sum, force, apart);
+                    if PERIODIC {
+                        add_virial(&mut sum[virial..], force, apart);
+                    }
                     let masters = [0, 1, 2, 3].map(|a| (corners.nodes[a], weights[a]));
                     let one = (slave, constant(1.0));
                     add_pair(forces, flags, force, real(params.force_quantum), [one], masters);
                     let nodes = masters.into_iter().chain([one]);
                     add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes);
-                    raise(&flags[status::PENETRATION[usize::from(!is_thread)]], depth);
+                    raise(&flags[status::PENETRATION[usize::from(!THREAD)]], depth);
                     first = first.or(Some((motion, apart, masters)));
                 }
                 let size = norm(push);
+                let tangential = penalty * real(params.tangential);
                 let Some((motion, apart, masters)) = first.filter(|_| size > zero) else {
-                    sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
+                    if FRICTION {
+                        let elastic = [state[1], state[2], state[3]];
+                        sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
+                        state[1..].fill(zero);
+                    }
                     // a point behind a face keeps being looked at
-                    let gap = if is_thread || point.height() > zero { point.distance - radius } else { zero };
-                    let left = if open && first.is_some() { constant(TOUCH) } else { -gap.max(zero) };
-                    state.copy_from_slice(&[zero, zero, zero, left]);
+                    let gap = if THREAD || point.height() > zero { point.distance - radius } else { zero };
+                    state[0] = if open && first.is_some() { constant(TOUCH) } else { -gap.max(zero) };
                     continue;
                 };
                 touches = true;
-                let limit = real(params.friction) * normal_force;
-                let slid = slide(elastic, scale(motion, elapsed), scale(push, constant(1.0) / size), tangential, limit);
-                sum[SUM_FRICTION] = sum[SUM_FRICTION] + slid.dissipated;
-                sum[SUM_SLIP] = sum[SUM_SLIP] + slid.slip;
-                state[..3].copy_from_slice(&slid.elastic);
-                state[3] = normal_force;
-                energy = energy + constant(0.5) * tangential * dot(slid.elastic, slid.elastic);
-                let force = scale(slid.elastic, -tangential);
-                add_virial(sum, force, apart);
-                let one = (slave, constant(1.0));
-                add_pair(forces, flags, force, real(params.force_quantum), [one], masters);
+                state[0] = normal_force;
+                if FRICTION {
+                    let elastic = [state[1], state[2], state[3]];
+                    let limit = real(params.friction) * normal_force;
+                    let normal = scale(push, constant(1.0) / size);
+                    let slid = slide(elastic, scale(motion, elapsed), normal, tangential, limit);
+                    sum[SUM_FRICTION] = sum[SUM_FRICTION] + slid.dissipated;
+                    sum[SUM_SLIP] = sum[SUM_SLIP] + slid.slip;
+                    state[1..].copy_from_slice(&slid.elastic);
+                    energy = energy + constant(0.5) * tangential * dot(slid.elastic, slid.elastic);
+                    let force = scale(slid.elastic, -tangential);
+                    if PERIODIC {
+                        add_virial(&mut sum[virial..], force, apart);
+                    }
+                    let one = (slave, constant(1.0));
+                    add_pair(forces, flags, force, real(params.force_quantum), [one], masters);
+                }
             }
             sum[SUM_ENERGY] = energy;
             if touches {
-                flags[status::TOUCHING[usize::from(!is_thread)]].fetch_add(1, Ordering::Relaxed);
+                flags[status::TOUCHING[usize::from(!THREAD)]].fetch_add(1, Ordering::Relaxed);
             }
         }
     }

@@ -5,13 +5,13 @@
 
 use super::friction::slide;
 use super::grid::{BOX, absolute, cell_index, cells, inverse, pull_back};
-use super::penalty::{Press, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, press};
-use super::{EMPTY, Params, add_pair, add_stiffness, key, of_key, status};
+use super::penalty::{Press, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, press, virial};
+use super::{EMPTY, MOST_STATE, Params, add_pair, add_stiffness, key, of_key, slot_state, status};
 use crate::elements::beam2;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::position::QUANTUM;
-use crate::kernel::shader::Shader;
+use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale, sub};
 use std::ops::Range;
@@ -19,8 +19,6 @@ use std::sync::atomic::Ordering;
 
 /// Numbers of a beam's place on its thread: arc length of its middle, mm; its length, mm; length of a closed thread, mm, else 0.
 pub const ARC: usize = 3;
-/// Numbers of a slot: elastic tangential displacement, mm (3); normal force, N.
-pub const STATE: usize = 4;
 /// Pairs that a beam can have.
 pub const MOST_PAIRS: usize = 64;
 
@@ -31,12 +29,12 @@ pub const QUANTA: usize = 3;
 pub const REMAINDER: usize = 4;
 
 /// Finds pairs of beams.
-pub struct Pairs;
+pub struct Pairs<const PERIODIC: bool>;
 /// Contact forces of pairs of beams.
-pub struct Force;
+pub struct Force<const FRICTION: bool, const PERIODIC: bool>;
 
 /// What both kernels read of beams.
-struct Scene<'a, R> {
+struct Scene<'a, R, const PERIODIC: bool> {
     ends: &'a [u32],
     beams: &'a [R],
     reference: Lattice<'a>,
@@ -45,7 +43,7 @@ struct Scene<'a, R> {
     period: [i32; 2],
 }
 
-impl<'a, R: Real> Scene<'a, R> {
+impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
     #[inline(always)]
     fn new(io: &'a Io<R>, period: [i32; 2]) -> Self {
         Self {
@@ -61,7 +59,7 @@ impl<'a, R: Real> Scene<'a, R> {
     /// A beam's vector, in the reference and now.
     #[inline(always)]
     fn vector(&self, beam: usize) -> (Vector<R>, Vector<R>) {
-        let (d, change) = beam2::vector(self.beams, self.ends, beam, &self.displacement, self.gradient);
+        let (d, change) = beam2::vector::<_, PERIODIC>(self.beams, self.ends, beam, &self.displacement, self.gradient);
         (d, add(d, change))
     }
 
@@ -69,9 +67,10 @@ impl<'a, R: Real> Scene<'a, R> {
     #[inline(always)]
     fn between(&self, a: usize, b: usize, image: [i32; 2]) -> (Vector<R>, Vector<R>) {
         let (a, b) = (self.ends[2 * a] as usize, self.ends[2 * b] as usize);
-        let shift = [image[0].wrapping_mul(self.period[0]), image[1].wrapping_mul(self.period[1])];
+        let shift = if PERIODIC { [0, 1].map(|k| image[k].wrapping_mul(self.period[k])) } else { [0; 2] };
         let rest: Vector<R> = self.reference.between(b, a, shift);
-        (rest, add(add(rest, apply(self.gradient, rest)), self.displacement.between(b, a)))
+        let affine = if PERIODIC { add(rest, apply(self.gradient, rest)) } else { rest };
+        (rest, add(affine, self.displacement.between(b, a)))
     }
 }
 
@@ -101,8 +100,8 @@ pub fn closest_points<R: Real>(d1: Vector<R>, d2: Vector<R>, start: Vector<R>) -
     }
 }
 
-impl Kernel for Pairs {
-    const SHADER: Shader = Shader::new("contact/threads", "pairs");
+impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
+    const SHADER: Shader = Shader { defines: &[when(PERIODIC, "PERIODIC")], ..Shader::new("contact/threads", "pairs") };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -114,13 +113,13 @@ impl Kernel for Pairs {
         const BOXES: usize = 9;
         let params: Params = io.params();
         let constant = L::Scalar::from_f64;
-        let scene = Scene::new(io, params.period);
+        let scene = Scene::<_, PERIODIC>::new(io, params.period);
         let (threads, arcs) = (io.uints(THREADS), io.scalars(ARCS));
         let (counts, lists, boxes) = (io.uints(COUNTS), io.uints(ITEMS), io.scalars(BOXES));
         let mut keys = io.own::<u32>(10);
         let mut states = io.own::<L::Scalar>(11);
         let flags = io.atomic_uints(12);
-        let inverse = inverse(&io.row.gradient);
+        let inverse = inverse::<_, PERIODIC>(&io.row.gradient);
         let period = params.period.map(|p| L::Scalar::from_i32(p) * constant(QUANTUM));
         let reach = constant(f64::from(2.0 * params.thread_radius + params.skin));
         let slots = params.beam_slots as usize;
@@ -134,7 +133,7 @@ impl Kernel for Pairs {
             let back = pull_back(&inverse, along);
             let range = |k: usize| {
                 let end = start[k] + back[k];
-                cells(&params, k, start[k].min(end), start[k].max(end))
+                cells::<_, PERIODIC>(&params, k, start[k].min(end), start[k].max(end))
             };
             let ((x0, x1), (y0, y1)) = (range(0), range(1));
             if !(start[0].is_finite() && start[1].is_finite()) {
@@ -160,7 +159,8 @@ impl Kernel for Pairs {
                         }
                         let theirs = &boxes[BOX * near as usize..][..BOX];
                         let image = [0, 1].map(|k| {
-                            if params.period[k] == 0 { 0 } else { ((middle[k] - theirs[k]) / period[k]).to_i32() }
+                            let repeats = PERIODIC && params.period[k] != 0;
+                            if repeats { ((middle[k] - theirs[k]) / period[k]).to_i32() } else { 0 }
                         });
                         let (_, apart) = scene.between(beam, other, image);
                         let (_, direction) = scene.vector(other);
@@ -189,33 +189,37 @@ impl Kernel for Pairs {
                 count = slots;
             }
             let (keys, states) = (keys.item(0, beam), states.item(0, beam));
-            let old: Vec<(u32, [L::Scalar; STATE])> = keys
-                .iter()
-                .zip(states.chunks_exact(STATE))
-                .filter(|(key, _)| **key != EMPTY)
-                .map(|(key, s)| (*key, [s[0], s[1], s[2], s[3]]))
-                .collect();
-            for (slot, (key, state)) in keys.iter_mut().zip(states.chunks_exact_mut(STATE)).enumerate() {
+            let size = params.state as usize;
+            let mut old = [(EMPTY, [constant(0.0); MOST_STATE]); MOST_PAIRS];
+            for ((old, key), state) in old.iter_mut().zip(keys.iter()).zip(states.chunks_exact(size)) {
+                old.0 = *key;
+                old.1[..size].copy_from_slice(state);
+            }
+            for (slot, (key, state)) in keys.iter_mut().zip(states.chunks_exact_mut(size)).enumerate() {
                 *key = found[..count].get(slot).copied().unwrap_or(EMPTY);
                 let known = old.iter().find(|(old, _)| *key != EMPTY && old == key);
-                state.copy_from_slice(&known.map_or([constant(0.0); STATE], |(_, state)| *state));
+                state.copy_from_slice(&known.map_or([constant(0.0); MOST_STATE], |(_, state)| *state)[..size]);
             }
         }
     }
 }
 
-impl Kernel for Force {
-    const SHADER: Shader = Shader::new("contact/threads", "force");
+impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERIODIC> {
+    const SHADER: Shader = Shader {
+        defines: &[when(FRICTION, "FRICTION"), when(PERIODIC, "PERIODIC")],
+        ..Shader::new("contact/threads", "force")
+    };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         const VELOCITY: usize = 5;
         const MASS: usize = 6;
+        let (state_size, virial) = const { (slot_state(FRICTION), virial(FRICTION)) };
         let params: Params = io.params();
         let real = |x: f32| L::Scalar::from_f64(f64::from(x));
         let constant = L::Scalar::from_f64;
         let (zero, one) = (constant(0.0), constant(1.0));
-        let scene = Scene::new(io, params.period);
+        let scene = Scene::<_, PERIODIC>::new(io, params.period);
         let velocity = Field::new(io, VELOCITY);
         let mass = io.scalars(MASS);
         let mut keys = io.own::<u32>(7);
@@ -245,10 +249,12 @@ impl Kernel for Force {
                 let depth = radius + radius - distance;
                 let penalty = real(params.thread_thread);
                 let tangential = penalty * real(params.tangential);
-                let state = &mut slot_states[STATE * slot..][..STATE];
-                let elastic = [state[0], state[1], state[2]];
+                let state = &mut slot_states[state_size * slot..][..state_size];
                 if depth <= zero || distance < constant(1e-6) {
-                    sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
+                    if FRICTION {
+                        let elastic = [state[1], state[2], state[3]];
+                        sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
+                    }
                     state.fill(zero);
                     continue;
                 }
@@ -268,23 +274,32 @@ impl Kernel for Force {
                     inverse = inverse + weight * weight / mass[node];
                 }
                 let between = sub(scale(rest, s), fma(direction_rest, t, apart_rest));
-                let motion = add(motion, apply(&io.row.rate, between));
+                if PERIODIC {
+                    motion = add(motion, apply(&io.row.rate, between));
+                }
                 let approach = dot(motion, normal);
                 let Press { elastic_force, pressing: normal_force, row_sum } =
                     press(&params, io.row, penalty, depth, inverse, approach);
                 sum[SUM_DAMPING] = sum[SUM_DAMPING] + (elastic_force - normal_force) * approach * elapsed;
                 let growth = constant(2.0) * real(params.thread_radius) * io.row.radius_increment;
                 sum[SUM_RADIUS] = sum[SUM_RADIUS] + elastic_force * growth;
-                let limit = real(params.friction) * normal_force;
-                let slid = slide(elastic, scale(motion, elapsed), normal, tangential, limit);
-                sum[SUM_FRICTION] = sum[SUM_FRICTION] + slid.dissipated;
-                sum[SUM_SLIP] = sum[SUM_SLIP] + slid.slip;
-                state[..3].copy_from_slice(&slid.elastic);
-                state[3] = normal_force;
-                energy =
-                    energy + constant(0.5) * (elastic_force * depth + tangential * dot(slid.elastic, slid.elastic));
-                let force = sub(scale(normal, normal_force), scale(slid.elastic, tangential));
-                add_virial(sum, force, between);
+                state[0] = normal_force;
+                let mut stored = elastic_force * depth;
+                let mut force = scale(normal, normal_force);
+                if FRICTION {
+                    let elastic = [state[1], state[2], state[3]];
+                    let limit = real(params.friction) * normal_force;
+                    let slid = slide(elastic, scale(motion, elapsed), normal, tangential, limit);
+                    sum[SUM_FRICTION] = sum[SUM_FRICTION] + slid.dissipated;
+                    sum[SUM_SLIP] = sum[SUM_SLIP] + slid.slip;
+                    state[1..].copy_from_slice(&slid.elastic);
+                    stored = stored + tangential * dot(slid.elastic, slid.elastic);
+                    force = sub(force, scale(slid.elastic, tangential));
+                }
+                energy = energy + constant(0.5) * stored;
+                if PERIODIC {
+                    add_virial(&mut sum[virial..], force, between);
+                }
                 add_pair(forces, flags, force, real(params.force_quantum), nodes, others);
                 add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes.into_iter().chain(others));
                 raise(&flags[status::PENETRATION[2]], depth);

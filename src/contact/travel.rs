@@ -1,10 +1,10 @@
-//! How far nodes have moved since the last search, how fast they are, and whether they are still numbers in range.
+//! How fast nodes are, whether they are still numbers in range, and with contact how far they have moved since the last search.
 
 use super::status;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
 use crate::kernel::position::{MOST_MM, difference, in_mm};
-use crate::kernel::shader::Shader;
+use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::dot;
 use std::ops::Range;
@@ -12,15 +12,14 @@ use std::sync::atomic::Ordering;
 
 pub const QUANTA: usize = 0;
 pub const REMAINDER: usize = 1;
-/// Displacements at the last search.
+/// Displacements at the last search; [`Travel`] reads the velocity first, and these only with contact.
 pub const SEARCH_QUANTA: usize = 2;
 pub const SEARCH_REMAINDER: usize = 3;
-pub const VELOCITY: usize = 4;
 
 /// Notes displacements at a search.
 pub struct Remember;
-/// Raises the largest distance travelled since, and the largest speed.
-pub struct Travel;
+/// Raises the largest speed; with `CONTACT` also the largest distance travelled since the last search.
+pub struct Travel<const CONTACT: bool>;
 
 impl Kernel for Remember {
     const SHADER: Shader = Shader::new("contact/travel", "remember");
@@ -40,27 +39,32 @@ impl Kernel for Remember {
     }
 }
 
-impl Kernel for Travel {
-    const SHADER: Shader = Shader::new("contact/travel", "travel");
+impl<const CONTACT: bool> Kernel for Travel<CONTACT> {
+    const SHADER: Shader = Shader { defines: &[when(CONTACT, "CONTACT")], ..Shader::new("contact/travel", "travel") };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        const STATUS: usize = 5;
+        const VELOCITY: usize = 2;
         let (quanta, remainder) = (io.ints(QUANTA), io.scalars(REMAINDER));
-        let (search_quanta, search_remainder) = (io.ints(SEARCH_QUANTA), io.scalars(SEARCH_REMAINDER));
-        let status = io.atomic_uints(STATUS);
+        let searched = CONTACT.then(|| (io.ints(SEARCH_QUANTA + 1), io.scalars(SEARCH_REMAINDER + 1)));
+        let status = io.atomic_uints(if CONTACT { 5 } else { 3 });
         let plane = remainder.len() / 3;
         let velocity = Field::new(io, VELOCITY);
         let (mut largest, mut fastest) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(0.0));
         for node in items {
             let (mut square, mut furthest) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(0.0));
+            let mut far = L::Scalar::from_f64(0.0);
             for k in 0..3 {
                 let i = node + k * plane;
-                let d = difference(quanta[i], remainder[i], search_quanta[i], search_remainder[i]);
-                square = square + d * d;
-                furthest = furthest.max(in_mm(quanta[i], remainder[i]).abs());
+                if let Some((search_quanta, search_remainder)) = searched {
+                    let d = difference(quanta[i], remainder[i], search_quanta[i], search_remainder[i]);
+                    square = square + d * d;
+                }
+                let moved = in_mm(quanta[i], remainder[i]);
+                far = far + moved * moved;
+                furthest = furthest.max(moved.abs());
             }
-            if !square.is_finite() {
+            if !far.is_finite() {
                 status[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
             } else if furthest > L::Scalar::from_f64(MOST_MM) {
                 status[status::FLAGS].fetch_or(status::OUT_OF_RANGE, Ordering::Relaxed);
@@ -69,7 +73,9 @@ impl Kernel for Travel {
             let v = velocity.at(node);
             fastest = fastest.max(dot(v, v));
         }
-        raise(&status[status::TRAVEL], largest.sqrt());
+        if CONTACT {
+            raise(&status[status::TRAVEL], largest.sqrt());
+        }
         raise(&status[status::SPEED], fastest.sqrt());
     }
 }

@@ -7,15 +7,17 @@
 use crate::contact::status::CONTACT_RATE;
 use crate::elements::hex8::LANES;
 use crate::kernel::lane::{Lane, Real};
-use crate::kernel::shader::Shader;
+use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
 /// Corner slots a solid node gathers.
 pub const SOLID: usize = 8;
-/// Slots a thread node gathers: two beams, then three bends (as first, middle and last node).
-pub const THREAD: usize = 5;
+/// Slots a thread node gathers: two beams.
+pub const THREAD: usize = 2;
+/// And with bending: three bends, as first, middle and last node.
+pub const BENT: usize = 3;
 /// Nothing to gather.
 pub const NONE: u32 = u32::MAX;
 
@@ -39,32 +41,32 @@ pub const SOLID_SLOTS: usize = 0;
 pub const HEX_FORCE: usize = 1;
 pub const THREAD_SLOTS: usize = 2;
 pub const BEAM_FORCE: usize = 3;
-pub const BEND_FORCE: usize = 4;
-pub const MASS: usize = 5;
-/// Row sums of element stiffness, N/mm; only with contact-aware mass.
-pub const ELEMENT_STIFFNESS: usize = 6;
-/// The first write: acceleration, mm/s² (3 planes); without contact-aware mass, all writes are one number earlier.
-const ACCELERATION: usize = 7;
+pub const MASS: usize = 4;
+/// Slots and forces of bends, only with `BENDING`; without it, what follows is two numbers earlier.
+pub const BEND_SLOTS: usize = 5;
+pub const BEND_FORCE: usize = 6;
+/// Row sums of element stiffness, N/mm; only with `MASS_ADDED`.
+pub const ELEMENT_STIFFNESS: usize = 7;
+/// The first write: acceleration, mm/s² (3 planes); without `MASS_ADDED`, all writes are one number earlier.
+const ACCELERATION: usize = 8;
 /// Inverse of the mass that acts, 1/tonne.
-const INVERSE_MASS: usize = 8;
+const INVERSE_MASS: usize = 9;
 /// Contact force in quanta (3 planes), set back to zero.
-const CONTACT_FORCE: usize = 9;
+const CONTACT_FORCE: usize = 10;
 /// Contact stiffness in quanta, set back to zero.
-const CONTACT_STIFFNESS: usize = 10;
-/// Added mass, tonne; without contact-aware mass, the status.
-const ADDED_MASS: usize = 11;
-const STATUS: usize = 11;
+const CONTACT_STIFFNESS: usize = 11;
+/// Added mass, tonne; without `MASS_ADDED`, the status.
+const ADDED_MASS: usize = 12;
+const STATUS: usize = 12;
 
-/// Assembly; with `CONTACT` contact forces, with `MASS_ADDED` contact-aware mass.
-pub struct Assemble<const CONTACT: bool, const MASS_ADDED: bool>;
+/// Assembly; with `CONTACT` contact forces, with `MASS_ADDED` contact-aware mass, with `BENDING` bends of threads.
+pub struct Assemble<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool>;
 
-impl<const CONTACT: bool, const MASS_ADDED: bool> Kernel for Assemble<CONTACT, MASS_ADDED> {
+impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool> Kernel
+    for Assemble<CONTACT, MASS_ADDED, BENDING>
+{
     const SHADER: Shader = Shader {
-        defines: match (CONTACT, MASS_ADDED) {
-            (true, true) => &["CONTACT", "MASS_ADDED"],
-            (true, false) => &["CONTACT"],
-            _ => &[],
-        },
+        defines: &[when(CONTACT, "CONTACT"), when(MASS_ADDED, "MASS_ADDED"), when(BENDING, "BENDING")],
         ..Shader::new("dynamics/assemble", "assemble")
     };
 
@@ -73,15 +75,17 @@ impl<const CONTACT: bool, const MASS_ADDED: bool> Kernel for Assemble<CONTACT, M
         let params: Params = io.params();
         let first_thread = params.first_thread as usize;
         let (solid, hexes) = (io.uints(SOLID_SLOTS), io.scalars(HEX_FORCE));
-        let (thread, beams, bends) = (io.uints(THREAD_SLOTS), io.scalars(BEAM_FORCE), io.scalars(BEND_FORCE));
+        let (thread, beams) = (io.uints(THREAD_SLOTS), io.scalars(BEAM_FORCE));
+        let bends = BENDING.then(|| (io.uints(BEND_SLOTS), io.scalars(BEND_FORCE)));
         let masses = io.scalars(MASS);
-        let missing = usize::from(!MASS_ADDED);
+        let unbent = 2 * usize::from(!BENDING);
+        let missing = unbent + usize::from(!MASS_ADDED);
         let mut acceleration = io.own::<L::Scalar>(ACCELERATION - missing);
         let mut inverse = io.own::<L::Scalar>(INVERSE_MASS - missing);
         let mut contact_force = CONTACT.then(|| io.own::<i32>(CONTACT_FORCE - missing));
         let mut contact_stiffness = CONTACT.then(|| io.own::<i32>(CONTACT_STIFFNESS - missing));
-        let elements = if MASS_ADDED { io.scalars(ELEMENT_STIFFNESS) } else { &[] };
-        let mut added = MASS_ADDED.then(|| io.own::<L::Scalar>(ADDED_MASS));
+        let elements = if MASS_ADDED { io.scalars(ELEMENT_STIFFNESS - unbent) } else { &[] };
+        let mut added = MASS_ADDED.then(|| io.own::<L::Scalar>(ADDED_MASS - unbent));
         let zero = L::Scalar::from_f64(0.0);
         let real = |x: f32| L::Scalar::from_f64(f64::from(x));
         let reach = real(params.mass_factor * 0.25) * io.row.dt * io.row.dt;
@@ -98,15 +102,18 @@ impl<const CONTACT: bool, const MASS_ADDED: bool> Kernel for Assemble<CONTACT, M
             } else {
                 let slots = &thread[THREAD * (node - first_thread)..][..THREAD];
                 // the node is the first of one beam and the second of another
-                for (slot, sign) in slots[..2].iter().zip([1.0, -1.0]) {
+                for (slot, sign) in slots.iter().zip([1.0, -1.0]) {
                     if *slot != NONE {
                         add(&mut force, &beams[3 * *slot as usize..][..3], sign);
                     }
                 }
-                for (slot, signs) in slots[2..].iter().zip([[1.0, 0.0], [-1.0, 1.0], [0.0, -1.0]]) {
-                    if *slot != NONE {
-                        for (k, sign) in signs.into_iter().enumerate().filter(|(_, s)| *s != 0.0) {
-                            add(&mut force, &bends[6 * *slot as usize + 3 * k..][..3], sign);
+                if let Some((bent, bends)) = bends {
+                    let slots = &bent[BENT * (node - first_thread)..][..BENT];
+                    for (slot, signs) in slots.iter().zip([[1.0, 0.0], [-1.0, 1.0], [0.0, -1.0]]) {
+                        if *slot != NONE {
+                            for (k, sign) in signs.into_iter().enumerate().filter(|(_, s)| *s != 0.0) {
+                                add(&mut force, &bends[6 * *slot as usize + 3 * k..][..3], sign);
+                            }
                         }
                     }
                 }

@@ -14,7 +14,7 @@
 use crate::elements::hex8::LANES;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::QUANTUM;
-use crate::kernel::shader::{Shader, Share};
+use crate::kernel::shader::{Shader, Share, when};
 use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
 use std::cell::RefCell;
@@ -58,8 +58,8 @@ pub const INVERSE_MASS: usize = 6;
 /// Change of acceleration, mm/s² (3 planes).
 const CORRECTION: usize = 7;
 
-/// The correction of accelerations.
-pub struct FibreLines;
+/// The correction of accelerations; with `PERIODIC` lines deform with F̄ and may close through the cell.
+pub struct FibreLines<const PERIODIC: bool>;
 
 thread_local! {
     /// Working memory of a sweep; f64 for its alignment and size.
@@ -76,8 +76,9 @@ const CORNER: usize = 9;
 const RIGHT: usize = 10;
 const ROWS: usize = 11;
 
-impl Kernel for FibreLines {
+impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
     const SHADER: Shader = Shader {
+        defines: &[when(PERIODIC, "PERIODIC")],
         // a workgroup for each line
         share: Share::Workgroups(LANES),
         ..Shader::new("dynamics/fibre_lines", "fibre_lines")
@@ -92,7 +93,7 @@ impl Kernel for FibreLines {
             let group = groups[group];
             memory.resize(memory.len().max(ROWS * LANES * (group.stations as usize + 1)), 0.0);
             let scratch: &mut [L::Scalar] = bytemuck::cast_slice_mut(&mut memory);
-            gather::<L>(io, &group, scratch);
+            gather::<L, PERIODIC>(io, &group, scratch);
             for lane in (0..group.lines as usize).step_by(L::WIDTH) {
                 solve::<L>(io, &group, &mut Sweep { scratch, lane });
             }
@@ -110,7 +111,7 @@ fn place(station: usize, row: usize) -> usize {
 
 /// Brings segment vectors, accelerations and inverse masses into working memory, one line a lane.
 #[inline(always)]
-fn gather<L: Lane>(io: &Io<L::Scalar>, group: &Group, scratch: &mut [L::Scalar]) {
+fn gather<L: Lane, const PERIODIC: bool>(io: &Io<L::Scalar>, group: &Group, scratch: &mut [L::Scalar]) {
     let (reference, quanta, remainder) = (io.ints(REFERENCE), io.ints(QUANTA), io.scalars(REMAINDER));
     let (acceleration, inverse, stiffness) =
         (io.scalars(ACCELERATION), io.scalars(INVERSE_MASS), io.scalars(STIFFNESS));
@@ -123,7 +124,7 @@ fn gather<L: Lane>(io: &Io<L::Scalar>, group: &Group, scratch: &mut [L::Scalar])
         for i in 0..n {
             let here = first + i;
             let (next, shift) = if i + 1 == n { (first, group.shift) } else { (here + 1, [0, 0]) };
-            let shift = [shift[0], shift[1], 0];
+            let shift = if PERIODIC { [shift[0], shift[1], 0] } else { [0; 3] };
             let rest: [L::Scalar; 3] = std::array::from_fn(|k| {
                 let d = reference[next + k * plane].wrapping_sub(reference[here + k * plane]).wrapping_add(shift[k]);
                 L::Scalar::from_i32(d) * quantum
@@ -132,8 +133,11 @@ fn gather<L: Lane>(io: &Io<L::Scalar>, group: &Group, scratch: &mut [L::Scalar])
                 let (a, b) = (next + k * plane, here + k * plane);
                 let w =
                     L::Scalar::from_i32(quanta[a].wrapping_sub(quanta[b])) * quantum + (remainder[a] - remainder[b]);
-                let affine = g[k][0] * rest[0] + g[k][1] * rest[1] + g[k][2] * rest[2];
-                scratch[place(i, DIRECTION + k) + lane] = rest[k] + affine + w;
+                let mut d = rest[k];
+                if PERIODIC {
+                    d = d + (g[k][0] * rest[0] + g[k][1] * rest[1] + g[k][2] * rest[2]);
+                }
+                scratch[place(i, DIRECTION + k) + lane] = d + w;
                 scratch[place(i, RESPONSE + k) + lane] = acceleration[b];
             }
             scratch[place(i, INVERSE) + lane] = inverse[here];

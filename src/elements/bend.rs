@@ -7,7 +7,7 @@
 use super::beam2::{TABLE, add_virial, vector};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Displacements;
-use crate::kernel::shader::Shader;
+use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{add, cross, dot, norm, scale, sub};
 use std::ops::Range;
@@ -41,8 +41,7 @@ pub fn smoothed(t: f64) -> f64 {
 }
 
 impl<const PERIODIC: bool> Kernel for Bend<PERIODIC> {
-    const SHADER: Shader =
-        Shader { defines: if PERIODIC { &["PERIODIC"] } else { &[] }, ..Shader::new("elements/bend", "force") };
+    const SHADER: Shader = Shader { defines: &[when(PERIODIC, "PERIODIC")], ..Shader::new("elements/bend", "force") };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -60,7 +59,7 @@ impl<const PERIODIC: bool> Kernel for Bend<PERIODIC> {
             let mut tangent = [[constant(0.0); 3]; 2];
             let mut inverse = [constant(0.0); 2];
             for k in 0..2 {
-                let (d, change) = vector(table, ends, beams[k], &w, &io.row.gradient);
+                let (d, change) = vector::<_, PERIODIC>(table, ends, beams[k], &w, &io.row.gradient);
                 let current = add(d, change);
                 reference[k] = d;
                 inverse[k] = constant(1.0) / norm(current);

@@ -36,7 +36,7 @@ pub struct Shader {
     pub file: &'static str,
     /// Name of the function.
     pub kernel: &'static str,
-    /// Names that `#if` finds defined.
+    /// Names that `#if` finds defined; see [`when`].
     pub defines: &'static [&'static str],
     /// What `#include LAW` stands for.
     pub law: Option<&'static str>,
@@ -68,6 +68,11 @@ impl Shader {
     pub const fn new(file: &'static str, kernel: &'static str) -> Self {
         Self { file, kernel, defines: &[], law: None, share: Share::Invocations(1) }
     }
+}
+
+/// A name that is defined only for kernels with a flag.
+pub const fn when(flag: bool, name: &'static str) -> &'static str {
+    if flag { name } else { "" }
 }
 
 /// The text of a stage's shader, and where its lines come from.

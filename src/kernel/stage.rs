@@ -67,6 +67,21 @@ pub trait Kernel: 'static {
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>);
 }
 
+/// The code of a kernel with flags: `flagged!(Integrate; lines, gravity)` is that of `Integrate<true, false>` if there are lines and
+/// there is no gravity.
+macro_rules! flagged {
+    ($($kernel:ident)::+; $($flag:expr),+) => { flagged!(@ ($($kernel)::+) []; $($flag),+) };
+    (@ ($($kernel:tt)+) [$($known:tt)*]; $flag:expr $(, $rest:expr)*) => {
+        if $flag {
+            flagged!(@ ($($kernel)+) [$($known)* true,]; $($rest),*)
+        } else {
+            flagged!(@ ($($kernel)+) [$($known)* false,]; $($rest),*)
+        }
+    };
+    (@ ($($kernel:tt)+) [$($known:tt)*];) => { Code::of::<$($kernel)+<$($known)*>>() };
+}
+pub(crate) use flagged;
+
 /// A kernel as function pointers for the CPU, and where its WGSL twin is.
 #[derive(Clone, Copy)]
 pub struct Code {

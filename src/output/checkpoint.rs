@@ -5,6 +5,7 @@
 //! and one from the end of each load step; their names begin with the number of the time step.
 
 use super::file;
+use crate::case::differences::differences;
 use crate::case::parse::reason;
 use crate::error::{Error, Result};
 use flate2::Compression;
@@ -176,27 +177,10 @@ pub fn through_text(value: &Value) -> Value {
 
 /// The first place at which two cases differ, with both values: `here` against `there`. Places in `free` may differ.
 pub fn difference(here: &Value, there: &Value, free: &dyn Fn(&str) -> bool) -> Option<String> {
-    fn compare(path: &str, pair: [Option<&Value>; 2], free: &dyn Fn(&str) -> bool) -> Option<String> {
-        if pair[0] == pair[1] || free(path) {
-            return None;
-        }
-        let below = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
-        match pair {
-            [Some(Value::Object(a)), Some(Value::Object(b))] => {
-                let keys = a.keys().chain(b.keys().filter(|k| !a.contains_key(*k)));
-                keys.into_iter().find_map(|k| compare(&below(k), [a.get(k), b.get(k)], free))
-            }
-            [Some(Value::Array(a)), Some(Value::Array(b))] => {
-                let items = 0..a.len().max(b.len());
-                items.into_iter().find_map(|i| compare(&below(&i.to_string()), [a.get(i), b.get(i)], free))
-            }
-            _ => {
-                let [a, b] = pair.map(|v| v.map_or("absent".to_owned(), Value::to_string));
-                Some(format!("{path} is {a}, but {b} in the checkpoint"))
-            }
-        }
-    }
-    compare("", [Some(here), Some(there)], free)
+    let found = differences(here, there, free);
+    let first = found.first()?;
+    let [a, b] = first.texts();
+    Some(format!("{} is {a}, but {b} in the checkpoint", first.place))
 }
 
 #[cfg(test)]

@@ -2,9 +2,12 @@
 //!
 //! A step: forces of hexahedra, beams, bends and contact, side by side; assembly to accelerations; prescribed motion;
 //! fibre lines; integration. When the contact skin is used up: grid, then candidates. For energies and limits: the
-//! diagnose stages, then the collect stages, which add up what the host reads. An effect that the scene does not have adds no buffer and no stage.
+//! diagnose stages, then the collect stages, which add up what the host reads. An effect that the scene does not have
+//! ([`Active`]) adds no buffer, no stage, and no text or branch to the stages that others share.
 
 mod conditions;
+mod contact;
+mod effects;
 mod solids;
 mod surfaces;
 mod threads;
@@ -12,24 +15,27 @@ mod ties;
 mod totals;
 
 use crate::case::Case;
-use crate::conditions::prescribed;
-use crate::contact::{
-    self, Params as ContactParams, candidates, grid, penalty, status, threads as thread_contact, tie, travel,
-};
-use crate::dynamics::{assemble, fibre_lines, integrate, time_step};
-use crate::elements::{beam2, bend, hex8};
+use crate::conditions::prescribed::{self, Prescribed};
+use crate::contact::{slot_state, status, travel};
+use crate::dynamics::assemble::{self, Assemble};
+use crate::dynamics::fibre_lines::{self, FibreLines};
+use crate::dynamics::integrate::{self, Integrate};
+use crate::dynamics::time_step;
+use crate::elements::beam2::Beam2;
+use crate::elements::{bend, hex8};
 use crate::error::Result;
 use crate::kernel::buffer::{Buffer, Description, Initial, Kind};
 use crate::kernel::position::quanta;
-use crate::kernel::stage::{Access, Code, Kernel, Plan, Stage};
+use crate::kernel::stage::{Access, Code, Kernel, Plan, Stage, flagged};
 use crate::materials::charmetant::Charmetant;
 use crate::materials::neo_hookean::NeoHookean;
 use crate::materials::{Law, Material};
 use crate::mesh::Mesh;
 use bytemuck::Pod;
 use conditions::Conditions;
+use contact::ContactScene;
+pub use effects::Active;
 use solids::Solids;
-use surfaces::Surfaces;
 use threads::Threads;
 use ties::Ties;
 pub use totals::{Largest, Sums, Totals};
@@ -37,6 +43,7 @@ pub use totals::{Largest, Sums, Totals};
 /// A plan, and what the host must know to drive it and to understand what it computes.
 pub struct Model {
     pub plan: Plan,
+    pub active: Active,
     pub buffers: Buffers,
     pub totals: Totals,
     /// True mass of every node, tonne, and mass with the floor.
@@ -51,6 +58,8 @@ pub struct Model {
     pub hex_volume: Vec<f64>,
     /// Node, area or length, and whether it is a thread's, of each contact slave.
     pub slaves: Vec<Slave>,
+    /// Numbers of a slot of a slave.
+    pub slot_state: usize,
     /// Factor on 2/ω of the explicit stiffness that fibre lines leave: √(1 − 1/(4β)).
     pub line_factor: f64,
     /// Largest share of the smallest contact radius or yarn thickness, mm, for guards.
@@ -97,7 +106,8 @@ pub struct Buffers {
     pub slip: Option<Buffer>,
 }
 
-/// Sizes of contact's tables, which grow when they overflow: slots up to 16, those of beams up to [`thread_contact::MOST_PAIRS`].
+/// Sizes of contact's tables, which grow when they overflow: slots up to 16, those of beams up to
+/// [`MOST_PAIRS`](crate::contact::threads::MOST_PAIRS).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacity {
     pub cell: usize,
@@ -140,7 +150,8 @@ impl Builder {
 }
 
 /// A stage that runs beside those before it.
-fn beside<K: Kernel>(
+fn coded(
+    kernel: Code,
     name: &'static str,
     count: usize,
     grain: usize,
@@ -157,12 +168,24 @@ fn beside<K: Kernel>(
         writes: writes.to_vec(),
         params: bytemuck::bytes_of(&params).to_vec(),
         constants: Vec::new(),
-        kernel: Code::of::<K>(),
+        kernel,
         waits: false,
     }
 }
 
-/// A stage that waits for those before it.
+/// A stage of a kernel without flags that runs beside those before it.
+fn beside<K: Kernel>(
+    name: &'static str,
+    count: usize,
+    grain: usize,
+    reads: &[Buffer],
+    writes: &[(Buffer, Access)],
+    params: impl Pod,
+) -> Stage {
+    coded(Code::of::<K>(), name, count, grain, reads, writes, params)
+}
+
+/// A stage of a kernel without flags that waits for those before it.
 fn after<K: Kernel>(
     name: &'static str,
     count: usize,
@@ -171,7 +194,12 @@ fn after<K: Kernel>(
     writes: &[(Buffer, Access)],
     params: impl Pod,
 ) -> Stage {
-    Stage { waits: true, ..beside::<K>(name, count, grain, reads, writes, params) }
+    waiting(beside::<K>(name, count, grain, reads, writes, params))
+}
+
+/// A stage that waits for those before it.
+fn waiting(stage: Stage) -> Stage {
+    Stage { waits: true, ..stage }
 }
 
 fn own(planes: usize, stride: usize) -> Access {
@@ -184,11 +212,14 @@ fn own(planes: usize, stride: usize) -> Access {
 /// Geometry that cannot be run: inverted elements, conditions without nodes.
 pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Result<Model> {
     let effects = &case.effects;
-    let periodic = mesh.period.is_some();
+    let line_groups = effects.fibre_lines.as_ref().map_or_else(Vec::new, |lines| line_groups(mesh, lines.threads));
+    let ties = effects.contact.as_ref().map_or_else(Ties::default, |contact| Ties::new(case, mesh, contact));
+    let active = Active::new(case, friction, mesh, &line_groups, ties.count() > 0);
+    let periodic = active.periodic;
     let nodes = mesh.nodes.len();
     let first = mesh.first_thread_node();
     let solids = Solids::new(mesh)?;
-    let threads = Threads::new(mesh, effects.bending);
+    let threads = Threads::new(mesh, active.bending);
     let (hexes, beams, bends) = (solids.headers.len(), threads.thread.len(), threads.pairs.len() / 2);
     let conditions = Conditions::new(case, mesh)?;
     let first_thread = first as u32;
@@ -208,7 +239,8 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let status_ = b.add("status", Kind::Uint, status::SIZE, false, Initial::Zero);
     let acceleration = b.scratch("acceleration", 3 * nodes);
     let inverse_mass = b.scratch("inverse mass", nodes);
-    let work = b.scratch("work on nodes", integrate::WORKS * nodes);
+    let works = active.works();
+    let work = (works.count() > 0).then(|| b.scratch("work on nodes", works.count() * nodes));
 
     // forces of elements
     let materials = b.table("materials", solids.materials.clone());
@@ -239,77 +271,76 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let ends = b.indices("beam ends", threads.ends.clone());
     let beam_table = b.table("beams", threads.beams.clone());
     let beam_force = b.scratch("beam forces", 3 * beams);
-    let bend_force = b.scratch("bend forces", 6 * bends);
     let beam_tension = (beams > 0).then(|| b.scratch("beam tension", beams));
-    let beam_work = (beams > 0).then(|| b.scratch("thermal work of beams", beams));
     let beam_virial = (beams > 0 && periodic).then(|| b.scratch("beam stress sums", 9 * beams));
-    if let (Some(tension), Some(thermal)) = (beam_tension, beam_work) {
-        let reads = [ends, beam_table, quanta_, remainder];
-        let writes = [(beam_force, own(1, 3)), (tension, own(1, 1)), (thermal, own(1, 1))];
-        b.plan.step.push(match beam_virial {
-            Some(virial) => {
-                let writes = [&writes[..], &[(virial, own(1, 9))]].concat();
-                beside::<beam2::Beam2<true>>("beam2", beams, 64, &reads, &writes, [0u32; 0])
-            }
-            None => beside::<beam2::Beam2<false>>("beam2", beams, 64, &reads, &writes, [0u32; 0]),
-        });
+    let beam_thermal = active.thermal.then(|| {
+        let strain = b.table("thermal strain of beams", threads.thermal.clone());
+        (strain, b.scratch("thermal work of beams", beams))
+    });
+    let beam_work = beam_thermal.map(|(_, work)| work);
+    if let Some(tension) = beam_tension {
+        let mut reads = vec![ends, beam_table, quanta_, remainder];
+        reads.extend(beam_thermal.map(|(strain, _)| strain));
+        let mut writes = vec![(beam_force, own(1, 3)), (tension, own(1, 1))];
+        writes.extend(beam_virial.map(|virial| (virial, own(1, 9))));
+        writes.extend(beam_work.map(|work| (work, own(1, 1))));
+        let kernel = flagged!(Beam2; periodic, active.thermal);
+        b.plan.step.push(coded(kernel, "beam2", beams, 64, &reads, &writes, [0u32; 0]));
     }
-    let bend_energy = (bends > 0).then(|| b.scratch("bend energies", bends));
-    let bend_virial = (bends > 0 && periodic).then(|| b.scratch("bend stress sums", 9 * bends));
-    if let Some(energy) = bend_energy {
+    let bend_buffers = active.bending.then(|| (b.scratch("bend forces", 6 * bends), b.scratch("bend energies", bends)));
+    let bend_virial = (active.bending && periodic).then(|| b.scratch("bend stress sums", 9 * bends));
+    if let Some((force, energy)) = bend_buffers {
         let pairs = b.indices("bend beams", threads.pairs.clone());
         let table = b.table("bends", threads.bends.clone());
         let reads = [pairs, table, ends, beam_table, quanta_, remainder];
-        let writes = [(bend_force, own(1, 6)), (energy, own(1, 1))];
-        b.plan.step.push(match bend_virial {
-            Some(virial) => {
-                let writes = [&writes[..], &[(virial, own(1, 9))]].concat();
-                beside::<bend::Bend<true>>("bend", bends, 64, &reads, &writes, [0u32; 0])
-            }
-            None => beside::<bend::Bend<false>>("bend", bends, 64, &reads, &writes, [0u32; 0]),
-        });
+        let mut writes = vec![(force, own(1, 6)), (energy, own(1, 1))];
+        writes.extend(bend_virial.map(|virial| (virial, own(1, 9))));
+        b.plan.step.push(coded(flagged!(bend::Bend; periodic), "bend", bends, 64, &reads, &writes, [0u32; 0]));
     }
 
     let element_limit = b.scratch("element stiffness of nodes", 2 * nodes);
-    let search_quanta = b.add("quanta at the last search", Kind::Int, 3 * nodes, true, Initial::Zero);
-    let search_remainder = b.add("remainder at the last search", Kind::Scalar, 3 * nodes, true, Initial::Zero);
-    let reads = [quanta_, remainder, search_quanta, search_remainder, velocity];
+    let searched = active.searches().then(|| {
+        let quanta = b.add("quanta at the last search", Kind::Int, 3 * nodes, true, Initial::Zero);
+        [quanta, b.add("remainder at the last search", Kind::Scalar, 3 * nodes, true, Initial::Zero)]
+    });
+    let mut reads = vec![quanta_, remainder, velocity];
+    reads.extend(searched.into_iter().flatten());
+    let kernel = flagged!(travel::Travel; active.searches());
     let writes = [(status_, Access::Atomic)];
-    b.plan.watch.push(after::<travel::Travel>("travel", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0]));
+    b.plan.watch.push(waiting(coded(kernel, "travel", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0])));
 
     // contact
-    let contact = match &effects.contact {
-        Some(chosen) => {
-            let scene = ContactScene {
-                chosen,
-                friction,
-                mesh,
-                threads: &threads,
-                conditions: &conditions,
-                ties: Ties::new(case, mesh, chosen.thread_thread_penalty_n_mm),
-                capacity,
-                reference,
-                quanta: quanta_,
-                remainder,
-                velocity,
-                mass,
-                status: status_,
-                ends,
-                beams: beam_table,
-            };
-            scene.add(&mut b)
-        }
-        None => None,
-    };
-
-    let writes = [(search_quanta, own(3, 1)), (search_remainder, own(3, 1))];
-    let reads = [quanta_, remainder];
-    b.plan.search.push(after::<travel::Remember>("remember", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0]));
+    let contact = effects.contact.as_ref().filter(|_| active.searches() || active.ties).map(|chosen| {
+        let scene = ContactScene {
+            chosen,
+            active,
+            friction,
+            mesh,
+            threads: &threads,
+            conditions: &conditions,
+            ties,
+            capacity,
+            reference,
+            quanta: quanta_,
+            remainder,
+            velocity,
+            mass,
+            status: status_,
+            ends,
+            beams: beam_table,
+        };
+        scene.add(&mut b)
+    });
+    if let Some([search_quanta, search_remainder]) = searched {
+        let writes = [(search_quanta, own(3, 1)), (search_remainder, own(3, 1))];
+        let reads = [quanta_, remainder];
+        b.plan.search.push(after::<travel::Remember>("remember", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0]));
+    }
 
     // accelerations
     let solid_slots = b.indices("corner slots of solid nodes", solids.slots.clone());
     let thread_slots = b.indices("slots of thread nodes", threads.slots.clone());
-    let contact_mass = effects.contact_mass.as_ref().filter(|_| contact.is_some());
+    let contact_mass = effects.contact_mass.as_ref().filter(|_| active.contact_mass);
     let assemble_params = assemble::Params {
         first_thread,
         force_quantum: contact.as_ref().map_or(1.0, |c| c.params.force_quantum),
@@ -317,35 +348,19 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         mass_factor: contact_mass.map_or(0.0, |c| c.factor as f32),
         mass_memory: contact_mass.map_or(0.0, |c| c.memory as f32),
     };
-    let mut reads = vec![solid_slots, hex_force, thread_slots, beam_force, bend_force, mass];
+    let mut reads = vec![solid_slots, hex_force, thread_slots, beam_force, mass];
+    if let Some((force, _)) = bend_buffers {
+        reads.extend([b.indices("bend slots of thread nodes", threads.bend_slots.clone()), force]);
+    }
     reads.extend(contact_mass.map(|_| element_limit));
     let mut writes = vec![(acceleration, own(3, 1)), (inverse_mass, own(1, 1))];
-    let mut added_mass = None;
-    let assembly = match &contact {
-        None => {
-            after::<assemble::Assemble<false, false>>("assemble", nodes, NODE_GRAIN, &reads, &writes, assemble_params)
-        }
-        Some(contact) => {
-            writes.extend([(contact.force, own(3, 1)), (contact.stiffness, own(1, 1))]);
-            if contact_mass.is_some() {
-                let added = b.add("added mass", Kind::Scalar, nodes, true, Initial::Zero);
-                added_mass = Some(added);
-                writes.push((added, own(1, 1)));
-                after::<assemble::Assemble<true, true>>("assemble", nodes, NODE_GRAIN, &reads, &writes, assemble_params)
-            } else {
-                writes.push((status_, Access::Atomic));
-                after::<assemble::Assemble<true, false>>(
-                    "assemble",
-                    nodes,
-                    NODE_GRAIN,
-                    &reads,
-                    &writes,
-                    assemble_params,
-                )
-            }
-        }
-    };
-    b.plan.step.push(assembly);
+    let added_mass = contact_mass.map(|_| b.add("added mass", Kind::Scalar, nodes, true, Initial::Zero));
+    if let Some(contact) = &contact {
+        writes.extend([(contact.force, own(3, 1)), (contact.stiffness, own(1, 1))]);
+        writes.push(added_mass.map_or((status_, Access::Atomic), |added| (added, own(1, 1))));
+    }
+    let kernel = flagged!(Assemble; contact.is_some(), active.contact_mass, active.bending);
+    b.plan.step.push(waiting(coded(kernel, "assemble", nodes, NODE_GRAIN, &reads, &writes, assemble_params)));
 
     // conditions
     let gravity = effects.gravity_mm_s2.unwrap_or_default().map(|g| g as f32);
@@ -360,7 +375,8 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         let writes =
             [(acceleration, Access::Scatter), (inverse_mass, Access::Scatter), (done, own(1, 1)), (force, own(1, 3))];
         let params = prescribed::Params { first_thread, gravity };
-        b.plan.step.push(after::<prescribed::Prescribed>("prescribed", count, NODE_GRAIN, &reads, &writes, params));
+        let kernel = flagged!(Prescribed; active.gravity, active.damping);
+        b.plan.step.push(waiting(coded(kernel, "prescribed", count, NODE_GRAIN, &reads, &writes, params)));
     }
 
     // fibre lines
@@ -368,24 +384,22 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let mut covered = vec![false; nodes];
     let mut correction = None;
     let mut line_factor = 1.0;
-    if let Some(lines) = &effects.fibre_lines {
-        let groups = line_groups(mesh, lines.threads);
-        for g in &groups {
+    if let Some(lines) = effects.fibre_lines.as_ref().filter(|_| active.fibre_lines) {
+        for g in &line_groups {
             covered[g.first as usize..][..(g.lines * g.stations) as usize].fill(true);
         }
         line_factor = libm::sqrt((1.0 - 0.25 / lines.beta).max(0.01));
         let response = b.scratch("line correction", 3 * nodes);
         correction = Some(response);
-        let table = b.indices("fibre lines", bytemuck::cast_slice(&groups).to_vec());
+        let table = b.indices("fibre lines", bytemuck::cast_slice(&line_groups).to_vec());
         let stiffness = b.table("line stiffness", line_stiffness.clone());
         let reads = [table, stiffness, reference, quanta_, remainder, acceleration, inverse_mass];
         let params = fibre_lines::Params { beta: lines.beta as f32 };
         let writes = [(response, Access::Scatter)];
-        let longest = groups.iter().map(|g| g.stations as usize).max().unwrap_or(1);
-        b.plan.step.push(Stage {
-            constants: vec![("STATIONS", longest)],
-            ..after::<fibre_lines::FibreLines>("fibre lines", groups.len(), 1, &reads, &writes, params)
-        });
+        let longest = line_groups.iter().map(|g| g.stations as usize).max().unwrap_or(1);
+        let kernel = flagged!(FibreLines; periodic);
+        let stage = coded(kernel, "fibre lines", line_groups.len(), 1, &reads, &writes, params);
+        b.plan.step.push(waiting(Stage { constants: vec![("STATIONS", longest)], ..stage }));
         if let Some((at, count)) = condition_nodes {
             b.plan.step.push(after::<prescribed::Hold>("hold", count, NODE_GRAIN, &[at], &writes, [0u32; 0]));
         }
@@ -393,23 +407,14 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
 
     // motion
     let params = integrate::Params { first_thread, gravity };
-    let reads: Vec<Buffer> = [acceleration, mass, inverse_mass].into_iter().chain(correction).collect();
-    let writes = [(velocity, own(3, 1)), (quanta_, own(3, 1)), (remainder, own(3, 1)), (work, own(3, 1))];
-    let lines = effects.fibre_lines.is_some();
-    b.plan.step.push(match (lines, effects.gravity_mm_s2.is_some()) {
-        (true, true) => {
-            after::<integrate::Integrate<true, true>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params)
-        }
-        (true, false) => {
-            after::<integrate::Integrate<true, false>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params)
-        }
-        (false, true) => {
-            after::<integrate::Integrate<false, true>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params)
-        }
-        (false, false) => {
-            after::<integrate::Integrate<false, false>>("integrate", nodes, NODE_GRAIN, &reads, &writes, params)
-        }
-    });
+    let mut reads = vec![acceleration];
+    reads.extend(work.map(|_| mass));
+    reads.extend(added_mass.map(|_| inverse_mass));
+    reads.extend(correction);
+    let mut writes = vec![(velocity, own(3, 1)), (quanta_, own(3, 1)), (remainder, own(3, 1))];
+    writes.extend(work.map(|work| (work, own(works.count(), 1))));
+    let kernel = flagged!(Integrate; active.fibre_lines, active.gravity, active.damping, active.contact_mass);
+    b.plan.step.push(waiting(coded(kernel, "integrate", nodes, NODE_GRAIN, &reads, &writes, params)));
 
     // limit of the time step
     let constant = constant_stiffness(mesh, &threads, &line_stiffness, &covered);
@@ -428,6 +433,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         hex_blocks: hexes,
         bends,
         slaves: contact.as_ref().map_or(0, |c| c.slaves.len()),
+        active,
         conditions: condition_nodes.map_or(0, |(_, count)| count),
         mass,
         velocity,
@@ -440,7 +446,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         beam_tension,
         beam_work,
         beam_virial,
-        bend_energy,
+        bend_energy: bend_buffers.map(|(_, energy)| energy),
         bend_virial,
         contact_sums: faces.map(|f| f.sums),
         pair_sums: pairs.map(|p| p.sums),
@@ -478,6 +484,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             slip,
         },
         totals,
+        active,
         plan: b.plan,
         true_mass,
         mass: floored,
@@ -486,6 +493,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         hex_place: solids.place,
         hex_volume: solids.volume,
         slaves: contact.map_or_else(Vec::new, |c| c.slaves),
+        slot_state: slot_state(active.friction),
         line_factor,
         limits: Limits { thread_radius: radius, yarn_thickness: thickness },
     })
@@ -524,195 +532,6 @@ impl HexStages<'_> {
         }
         let writes = [(self.bound, own(1, hex8::BOUND))];
         b.plan.diagnose.push(here(beside::<hex8::Bound<M>>("hex8 bound", count, GRAIN, reads, &writes, params)));
-    }
-}
-
-/// Buffers of one kind of contact that the host reads.
-#[derive(Clone, Copy)]
-struct ContactBuffers {
-    sums: Buffer,
-    keys: Buffer,
-    state: Buffer,
-}
-
-/// What contact adds to a plan.
-struct ContactParts {
-    params: ContactParams,
-    force: Buffer,
-    stiffness: Buffer,
-    faces: Option<ContactBuffers>,
-    pairs: Option<ContactBuffers>,
-    /// Energies of ties, and how many there are.
-    ties: Option<(Buffer, usize)>,
-    slaves: Vec<Slave>,
-}
-
-/// What contact needs to know of the scene.
-struct ContactScene<'a> {
-    chosen: &'a crate::case::effects::Contact,
-    friction: f64,
-    mesh: &'a Mesh,
-    threads: &'a Threads,
-    conditions: &'a Conditions,
-    ties: Ties,
-    capacity: Capacity,
-    reference: Buffer,
-    quanta: Buffer,
-    remainder: Buffer,
-    velocity: Buffer,
-    mass: Buffer,
-    status: Buffer,
-    ends: Buffer,
-    beams: Buffer,
-}
-
-impl ContactScene<'_> {
-    /// Adds the stages of contact; nothing if no pair can touch.
-    fn add(&self, b: &mut Builder) -> Option<ContactParts> {
-        let surfaces = Surfaces::new(self.mesh, self.threads, self.chosen);
-        let count = surfaces.count();
-        let beams = self.threads.thread.len();
-        let paired = if self.chosen.thread_thread { beams } else { 0 };
-        if count == 0 && paired == 0 {
-            return None;
-        }
-        let nodes = self.mesh.nodes.len();
-        let slabs = surfaces.slabs.len() / grid::SLAB;
-        let params = self.params(&surfaces, slabs);
-        let cells = (params.cells[0] * params.cells[1]) as usize;
-        let force = b.add("contact force", Kind::Int, 3 * nodes, false, Initial::Zero);
-        let stiffness = b.add("contact stiffness", Kind::Int, nodes, false, Initial::Zero);
-        let bodies = b.indices("bodies", bytemuck::cast_slice(&surfaces.bodies).to_vec());
-        let rings = b.indices("ring lines", surfaces.ring_lines);
-        let slab_table = b.indices("slabs", surfaces.slabs);
-        let counts = b.add("items of cells", Kind::Uint, cells, false, Initial::Zero);
-        let lists = b.add("cells", Kind::Uint, cells * self.capacity.cell, false, Initial::Zero);
-        let boxes = b.scratch("boxes", grid::BOX * (slabs + paired));
-        let place = [self.reference, self.quanta, self.remainder];
-        let status = (self.status, Access::Atomic);
-        b.plan.search.push(after::<grid::Clear>("clear grid", cells, 4096, &[], &[(counts, own(1, 1))], params));
-        let reads = [&[slab_table, bodies, rings][..], &place, &[self.ends, self.beams]].concat();
-        let writes = [(counts, Access::Atomic), (lists, Access::Scatter), (boxes, own(1, grid::BOX)), status];
-        b.plan.search.push(after::<grid::Fill>("grid", slabs + paired, 32, &reads, &writes, params));
-
-        let faces = (count > 0).then(|| {
-            let slaves = b.indices("slaves", surfaces.slaves.clone());
-            let values = b.table("slave values", surfaces.values.clone());
-            let slots = self.capacity.slots;
-            let keys_len = penalty::SLOT_KEYS * slots * count;
-            let keys =
-                b.add("contact candidates", Kind::Uint, keys_len, true, Initial::Uint(vec![contact::EMPTY; keys_len]));
-            let state =
-                b.add("contact friction", Kind::Scalar, penalty::SLOT_STATE * slots * count, true, Initial::Zero);
-            let sums = b.scratch("contact sums", penalty::SUMS * count);
-            let keys_own = (keys, own(1, penalty::SLOT_KEYS * slots));
-            let state_own = (state, own(1, penalty::SLOT_STATE * slots));
-            let reads = [&[slaves, values, slab_table, bodies, rings][..], &place, &[counts, lists, boxes]].concat();
-            let writes = [keys_own, state_own, status];
-            b.plan.search.push(after::<candidates::Candidates>("candidates", count, 64, &reads, &writes, params));
-            let reads = [&[slaves, values, bodies, rings][..], &place, &[self.velocity, self.mass]].concat();
-            let writes = [
-                keys_own,
-                state_own,
-                (sums, own(1, penalty::SUMS)),
-                (force, Access::Atomic),
-                (stiffness, Access::Atomic),
-                status,
-            ];
-            b.plan.step.push(beside::<penalty::Penalty>("contact", count, 64, &reads, &writes, params));
-            ContactBuffers { sums, keys, state }
-        });
-
-        let pairs = (paired > 0).then(|| {
-            let slots = self.capacity.beam_slots;
-            let of = b.indices("threads of beams", self.threads.thread.clone());
-            let arcs = b.table("arc lengths", self.threads.arcs.clone());
-            let keys_len = slots * beams;
-            let keys = b.add("beam pairs", Kind::Uint, keys_len, true, Initial::Uint(vec![contact::EMPTY; keys_len]));
-            let state =
-                b.add("beam pair friction", Kind::Scalar, thread_contact::STATE * slots * beams, true, Initial::Zero);
-            let sums = b.scratch("beam pair sums", penalty::SUMS * beams);
-            let common = [&[self.ends, self.beams][..], &place].concat();
-            let reads = [&common[..], &[of, arcs, counts, lists, boxes]].concat();
-            let keys_own = (keys, own(1, slots));
-            let state_own = (state, own(1, thread_contact::STATE * slots));
-            let writes = [keys_own, state_own, status];
-            b.plan.search.push(after::<thread_contact::Pairs>("beam pairs", beams, 32, &reads, &writes, params));
-            let reads = [&common[..], &[self.velocity, self.mass]].concat();
-            let writes = [
-                keys_own,
-                state_own,
-                (sums, own(1, penalty::SUMS)),
-                (force, Access::Atomic),
-                (stiffness, Access::Atomic),
-                status,
-            ];
-            b.plan.step.push(beside::<thread_contact::Force>("beam contact", beams, 32, &reads, &writes, params));
-            ContactBuffers { sums, keys, state }
-        });
-        let ties = (self.ties.count() > 0).then(|| {
-            let count = self.ties.count();
-            let nodes = b.indices("ties", self.ties.nodes.clone());
-            let values = b.table("tie values", self.ties.values.clone());
-            let energy = b.scratch("tie energies", count);
-            let reads = [nodes, values, self.quanta, self.remainder];
-            let writes = [(energy, own(1, 1)), (force, Access::Atomic), (stiffness, Access::Atomic), status];
-            b.plan.step.push(beside::<tie::Tie>("ties", count, 64, &reads, &writes, params));
-            (energy, count)
-        });
-        let slaves = surfaces
-            .slaves
-            .chunks_exact(penalty::SLAVE)
-            .zip(&surfaces.measure)
-            .map(|(s, measure)| Slave { node: s[0] as usize, measure: *measure, is_thread: s[1] == contact::EMPTY })
-            .collect();
-        Some(ContactParts { params, force, stiffness, faces, pairs, ties, slaves })
-    }
-
-    fn params(&self, surfaces: &Surfaces, slabs: usize) -> ContactParams {
-        /// Aimed size of a cell, mm.
-        const CELL: f64 = 0.5;
-        let mesh = self.mesh;
-        let mut low = [f64::INFINITY; 2];
-        let mut high = [f64::NEG_INFINITY; 2];
-        for x in mesh.nodes.iter().copied().chain(self.conditions.ends(mesh)) {
-            for k in 0..2 {
-                (low[k], high[k]) = (low[k].min(x[k]), high[k].max(x[k]));
-            }
-        }
-        let (origin, size) = match mesh.period {
-            Some(period) => ([0.0; 2], period),
-            // bodies that leave the box share its outermost cells
-            None => ([low[0] - CELL, low[1] - CELL], [high[0] - low[0] + 2.0 * CELL, high[1] - low[1] + 2.0 * CELL]),
-        };
-        let cells = size.map(|s| (libm::floor(s / CELL) as u32).clamp(1, 1024));
-        let stiffest = surfaces.values.chunks_exact(penalty::SLAVE_VALUES).map(|v| v[0]).fold(0.0, f64::max);
-        let stiffest = stiffest.max(self.chosen.thread_thread_penalty_n_mm);
-        let radius = self.threads.radius.iter().copied().fold(0.0, f64::max);
-        let thickness = mesh.blocks.iter().map(|b| thickness(mesh, b)).fold(f64::INFINITY, f64::min);
-        let depth = 0.5 * thickness.min(0.4);
-        let power = |x: f64| libm::exp2(libm::ceil(libm::log2(x)));
-        ContactParams {
-            period: mesh.period.unwrap_or_default().map(quanta),
-            cells,
-            capacity: self.capacity.cell as u32,
-            slots: self.capacity.slots as u32,
-            beam_slots: self.capacity.beam_slots as u32,
-            slabs: slabs as u32,
-            origin: origin.map(|x| x as f32),
-            cell: [0, 1].map(|k| (size[k] / f64::from(cells[k])) as f32),
-            skin: self.chosen.skin_mm as f32,
-            friction: if self.chosen.friction { self.friction as f32 } else { 0.0 },
-            tangential: self.chosen.tangential_ratio as f32,
-            damping: self.chosen.damping_ratio as f32,
-            // a pair may reach 2²⁷ quanta, a node the sum of sixteen such pairs
-            force_quantum: (power(stiffest * (depth + radius)) / f64::from(1 << 27)) as f32,
-            stiffness_quantum: (power(64.0 * stiffest) / f64::from(1 << 28)) as f32,
-            thread_radius: radius as f32,
-            thread_thread: self.chosen.thread_thread_penalty_n_mm as f32,
-            self_arc: self.chosen.self_contact_arc_mm as f32,
-            depth: depth.min(f64::from(f32::MAX)) as f32,
-        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Tables of contact: bodies and their rings, slabs for the grid, slave nodes with their penalties.
 
+use super::effects::Active;
 use super::threads::Threads;
 use crate::case::effects::Contact;
 use crate::contact::grid::SLAB_FACES;
@@ -23,9 +24,12 @@ pub struct Surfaces {
 }
 
 impl Surfaces {
-    /// Tables of a mesh for the pairs that can touch.
-    pub fn new(mesh: &Mesh, threads: &Threads, contact: &Contact) -> Self {
+    /// Tables of a mesh for the pairs that can touch; slaves on yarns come before those on threads.
+    pub fn new(mesh: &Mesh, threads: &Threads, contact: &Contact, active: Active) -> Self {
         let mut t = Self::default();
+        if !active.thread_yarn && !active.yarn_yarn {
+            return t;
+        }
         for (number, block) in mesh.blocks.iter().enumerate() {
             let surface = Surface::new(block);
             t.bodies.push(Body {
@@ -41,7 +45,7 @@ impl Surfaces {
                 let parts = (0..surface.ring()).step_by(SLAB_FACES);
                 t.slabs.extend(parts.flat_map(|ring| [number as u32, slice as u32, ring as u32]));
             }
-            if contact.yarn_yarn && mesh.blocks.len() > 1 {
+            if active.yarn_yarn {
                 let stations = block.stations();
                 for (place, area) in surface.tributary_areas(mesh).into_iter().enumerate() {
                     let node = surface.node(place / stations, 0).node + place % stations;
@@ -49,7 +53,7 @@ impl Surfaces {
                 }
             }
         }
-        if contact.thread_yarn && !mesh.blocks.is_empty() {
+        if active.thread_yarn {
             let first = mesh.first_thread_node();
             for (i, (length, radius)) in threads.tributary.iter().zip(&threads.radius).enumerate() {
                 t.slave(first + i, EMPTY, contact.thread_penalty_n_mm2 * length, *radius, *length);

@@ -1,6 +1,7 @@
 //! Tables of the beams: ends, vectors, stiffness, rest curvature, slots of nodes, lumped mass.
 
-use crate::dynamics::assemble::{NONE, THREAD};
+use crate::dynamics::assemble::{BENT, NONE, THREAD};
+use crate::elements::beam2::TABLE;
 use crate::elements::bend::smoothed;
 use crate::kernel::position::{QUANTUM, quanta};
 use crate::mesh::Mesh;
@@ -15,8 +16,11 @@ pub struct Threads {
     pub pairs: Vec<u32>,
     /// See [`crate::elements::bend::BEND`].
     pub bends: Vec<f64>,
-    /// Slots of each thread node.
+    /// Thermal strain of each beam.
+    pub thermal: Vec<f64>,
+    /// Slots of beams at each thread node, and of bends if there are any.
     pub slots: Vec<u32>,
+    pub bend_slots: Vec<u32>,
     /// Lumped mass of thread nodes, tonne.
     pub mass: Vec<f64>,
     /// Length that belongs to each thread node, mm.
@@ -40,6 +44,7 @@ impl Threads {
         let nodes = mesh.nodes.len() - first;
         let mut t = Self {
             slots: vec![NONE; THREAD * nodes],
+            bend_slots: if bending { vec![NONE; BENT * nodes] } else { Vec::new() },
             mass: vec![0.0; nodes],
             tributary: vec![0.0; nodes],
             line_stiffness: vec![0.0; nodes],
@@ -59,7 +64,8 @@ impl Threads {
                 let d = [0, 1, 2].map(|k| f64::from(to[k] - from[k]) * QUANTUM);
                 let length = libm::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
                 t.ends.extend([a.node as u32, b.node as u32]);
-                t.beams.extend([d[0], d[1], d[2], length, thread.axial, thread.thermal_strain]);
+                t.beams.extend([d[0], d[1], d[2], length, thread.axial]);
+                t.thermal.push(thread.thermal_strain);
                 t.thread.push(number as u32);
                 t.arcs.extend([arc + 0.5 * length, length, 0.0]);
                 arc += length;
@@ -85,7 +91,7 @@ impl Threads {
                 let pair = [base + i, base + (i + 1) % count];
                 let bend = t.pairs.len() / 2;
                 let tangent = |beam: usize| {
-                    let row = &t.beams[6 * beam..][..4];
+                    let row = &t.beams[TABLE * beam..][..4];
                     [row[0] / row[3], row[1] / row[3], row[2] / row[3]]
                 };
                 let (u, v) = (tangent(pair[0]), tangent(pair[1]));
@@ -102,7 +108,7 @@ impl Threads {
                 for (place, (node, weight)) in nodes.into_iter().zip(weights).enumerate() {
                     let node = node as usize - first;
                     t.bending_stiffness[node] += 0.5 * stiffness * weight * total;
-                    t.slots[THREAD * node + 2 + place] = bend as u32;
+                    t.bend_slots[BENT * node + place] = bend as u32;
                 }
             }
         }

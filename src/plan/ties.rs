@@ -2,6 +2,7 @@
 
 use crate::case::Case;
 use crate::case::domain::{Domain, ThreadEnds};
+use crate::case::effects::Contact;
 use crate::contact::face::{Closest, closest};
 use crate::fabric::specimen;
 use crate::mesh::surface::Surface;
@@ -35,8 +36,8 @@ struct Held {
 }
 
 impl Ties {
-    /// Ties of a case with springs of a stiffness, N/mm; none but in a specimen whose cut threads are held.
-    pub fn new(case: &Case, mesh: &Mesh, stiffness: f64) -> Self {
+    /// Ties of a case, as stiff as pairs of beams; none but in a specimen whose cut threads are held.
+    pub fn new(case: &Case, mesh: &Mesh, contact: &Contact) -> Self {
         let Domain::Specimen(specimen) = &case.domain else { return Self::default() };
         if specimen.thread_ends == ThreadEnds::Free {
             return Self::default();
@@ -62,7 +63,7 @@ impl Ties {
         for Held { node, corners, weights, .. } in held.into_values() {
             ties.nodes.push(node as u32);
             ties.nodes.extend(corners.map(|n| n as u32));
-            ties.values.extend(weights.into_iter().chain([stiffness]));
+            ties.values.extend(weights.into_iter().chain([contact.thread_thread_penalty_n_mm]));
         }
         ties
     }

@@ -1,13 +1,14 @@
 //! The stages that add up what kernels keep per item, and where the host finds the sums.
 
-use super::{Builder, beside};
+use super::{Active, Builder, beside, coded};
 use crate::contact::{penalty, slip};
+use crate::dynamics::energy;
+use crate::dynamics::integrate::Works;
 use crate::dynamics::totals::{self, Params, Sum, WORST, Worst};
-use crate::dynamics::{energy, integrate};
 use crate::elements::hex8::{self, LANES};
 use crate::kernel::buffer::Buffer;
 use crate::kernel::position::quanta;
-use crate::kernel::stage::{Access, Stage};
+use crate::kernel::stage::{Access, Code, Stage, flagged};
 use crate::mesh::Mesh;
 use std::ops::Range;
 
@@ -48,8 +49,9 @@ impl Largest {
 #[derive(Debug, Clone)]
 pub struct Totals {
     pub buffer: Buffer,
-    /// Work on nodes, one column a kind.
-    pub work: Sums,
+    /// Work on nodes, one column a kind, and which kinds there are.
+    pub work: Option<Sums>,
+    pub works: Works,
     pub thermal: Option<Sums>,
     pub reaction: Option<Sums>,
     /// Of hexahedra, beams and bends: nine components each.
@@ -83,11 +85,12 @@ pub(super) struct Sources<'a> {
     pub hex_blocks: usize,
     pub bends: usize,
     pub slaves: usize,
+    pub active: Active,
     pub conditions: usize,
     pub mass: Buffer,
     pub velocity: Buffer,
     pub reference: Buffer,
-    pub work: Buffer,
+    pub work: Option<Buffer>,
     pub element_limit: Buffer,
     pub beam_table: Buffer,
     pub hex_energy: Option<Buffer>,
@@ -235,10 +238,12 @@ impl Collector<'_> {
 pub(super) fn add(b: &mut Builder, s: &Sources) -> (Totals, Option<Buffer>) {
     let (nodes, beams, first) = (s.mesh.nodes.len(), s.mesh.beams(), s.mesh.first_thread_node());
     let buffer = b.scratch("totals", 0);
-    let slip = s.contact_sums.map(|sums| {
+    let Active { friction, periodic, .. } = s.active;
+    let slip = s.contact_sums.filter(|_| friction).map(|sums| {
         let slip = b.scratch("slip", s.slaves);
         let own = Access::Own { planes: 1, stride: 1 };
-        b.plan.collect.push(beside::<slip::Slip>("slip", s.slaves, 512, &[sums], &[(slip, own)], [0u32; 0]));
+        let kernel = flagged!(slip::Slip; periodic);
+        b.plan.collect.push(coded(kernel, "slip", s.slaves, 512, &[sums], &[(slip, own)], [0u32; 0]));
         slip
     });
     let jacobian = s.hex_energy.map(|energy| {
@@ -249,10 +254,10 @@ pub(super) fn add(b: &mut Builder, s: &Sources) -> (Totals, Option<Buffer>) {
     let c = &mut Collector { b, totals: buffer };
     let mut contact = Vec::new();
     if let Some(sums) = s.contact_sums {
-        contact.push(c.taken(sums, Columns::rows(s.slaves, penalty::SUMS), true));
+        contact.push(c.taken(sums, Columns::rows(s.slaves, penalty::sums(friction, periodic)), true));
     }
     if let Some(sums) = s.pair_sums {
-        contact.push(c.taken(sums, Columns::rows(beams, penalty::SUMS), false));
+        contact.push(c.taken(sums, Columns::rows(beams, penalty::sums(friction, periodic)), false));
     }
     let mut stress = Vec::new();
     if let Some(virial) = s.hex_virial {
@@ -266,7 +271,8 @@ pub(super) fn add(b: &mut Builder, s: &Sources) -> (Totals, Option<Buffer>) {
     };
     let totals = Totals {
         buffer,
-        work: c.taken(s.work, Columns::planes(nodes, integrate::WORKS), false),
+        work: s.work.map(|work| c.taken(work, Columns::planes(nodes, s.active.works().count()), false)),
+        works: s.active.works(),
         thermal: s.beam_work.map(|work| c.taken(work, Columns::range(0..beams), false)),
         reaction: s.reaction_work.map(|work| c.taken(work, Columns::range(0..s.conditions), false)),
         stress,

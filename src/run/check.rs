@@ -1,14 +1,19 @@
-//! A look at a case before it is run: sizes, effects, expected time, and on request the whole algorithm.
+//! A look at a case before it is run: sizes, effects, expected time, and on request what each effect costs and the whole algorithm.
 
-use super::scene;
-use crate::case::domain::Domain;
+use super::effects::{Effect, effects};
+use super::turns::{ratio, step_time};
+use super::{scene, simulation};
 use crate::case::read::Loaded;
 use crate::error::Result;
 use crate::simulate::{Make, Simulation};
 use std::fmt::Write as _;
-use std::time::Instant;
 
-/// Sizes and cost of a case; with `explain` the defaults in use and every stage of its plan.
+/// Seconds of the turns that the share of an effect is measured in, at most, and how many turns there are.
+const TURNS_S: f64 = 1.0;
+const TURNS: usize = 7;
+
+/// Sizes and cost of a case; with `explain` what called for each effect and what it costs, every stage of the plan, and the
+/// defaults in use.
 pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
     let (mesh, friction) = scene(loaded)?;
     let mut probe = Simulation::new(&loaded.case, friction, mesh, Make::default())?;
@@ -17,10 +22,10 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
     let (dt, end) = (probe.dt(), probe.schedule.end());
     // a few steps for the expected time; the first burst warms up
     probe.advance(16.0 * dt, |_| false)?;
-    let warm = Instant::now();
-    let steps = probe.step();
-    probe.advance(probe.time() + 64.0 * dt, |_| false)?;
-    let per_step = warm.elapsed().as_secs_f64() / (probe.step() - steps).max(1) as f64;
+    let before = probe.backend().timings();
+    let per_step = step_time(&mut probe, 64)?;
+    let stages = since(&before, probe.backend().timings());
+    let found = effects(loaded, &probe);
     let settled = loaded
         .case
         .integration
@@ -38,7 +43,7 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
         probe.mesh.nodes.len(),
         bytes as f64 / 1e6
     );
-    let _ = writeln!(t, "effects    {}", effects(loaded).join(", "));
+    let _ = writeln!(t, "effects    {}", found.iter().map(|e| e.name).collect::<Vec<_>>().join(", "));
     let _ = write!(
         t,
         "time       {:.3} ms; limit {:.2e} s at node {} ({}), step {settled:.2e} s, about {steps:.0} steps of {:.3} ms: {:.0} s on {}",
@@ -51,6 +56,7 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
         probe.backend().describe()
     );
     if explain {
+        costs(&mut t, loaded, &mut probe, &found, &stages, per_step)?;
         let plan = &probe.model.plan;
         for (list, stages) in [
             ("step", &plan.step),
@@ -84,22 +90,43 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
     Ok(t)
 }
 
-/// Names of the effects that are on.
-fn effects(loaded: &Loaded) -> Vec<String> {
-    let e = &loaded.case.effects;
-    let contact = e.contact.as_ref();
-    let on = [
-        ("thread–yarn contact", contact.is_some_and(|c| c.thread_yarn)),
-        ("yarn–yarn contact", contact.is_some_and(|c| c.yarn_yarn)),
-        ("thread–thread contact", contact.is_some_and(|c| c.thread_thread)),
-        ("friction", contact.is_some_and(|c| c.friction)),
-        ("bending", e.bending),
-        ("damping", e.damping.is_some()),
-        ("fibre lines", e.fibre_lines.is_some()),
-        ("contact mass", e.contact_mass.is_some()),
-        ("mass floor", e.mass_floor > 0.0),
-        ("gravity", e.gravity_mm_s2.is_some()),
-        ("periodic cell", matches!(loaded.case.domain, Domain::Cell { .. })),
-    ];
-    on.into_iter().filter(|(_, on)| *on).map(|(name, _)| name.to_owned()).collect()
+/// Names and seconds of stages since an earlier look.
+fn since(before: &[(&'static str, f64)], now: Vec<(&'static str, f64)>) -> Vec<(&'static str, f64)> {
+    let old = |name| before.iter().find(|(known, _)| *known == name).map_or(0.0, |(_, seconds)| *seconds);
+    now.into_iter().map(|(name, seconds)| (name, seconds - old(name))).collect()
+}
+
+/// What called for each effect, and its share of the time of all stages: of those that are there for it alone, or, where it is
+/// part of stages that others share, by trials without it.
+fn costs(
+    t: &mut String,
+    loaded: &Loaded,
+    probe: &mut Simulation,
+    found: &[Effect],
+    stages: &[(&'static str, f64)],
+    per_step: f64,
+) -> Result<()> {
+    let total: f64 = stages.iter().map(|(_, seconds)| seconds).sum();
+    let steps = ((TURNS_S / (2 * TURNS) as f64 / per_step) as u64).clamp(8, 256);
+    let _ = write!(t, "\neffects, their share of the time of a step where the run starts, and what called for them");
+    for effect in found {
+        let own = stages.iter().filter(|(name, _)| effect.stages.contains(name));
+        let share = 100.0 * own.map(|(_, seconds)| seconds).sum::<f64>() / total;
+        let shown = match effect.without(loaded).filter(|_| effect.stages.is_empty()) {
+            Some(without) => {
+                let mut without = simulation(&without, Make::default())?;
+                without.advance(0.0, |_| false)?;
+                let ratio = ratio(&mut without, probe, steps, TURNS)?;
+                format!("{:5.1} ± {:3.1} % *", 100.0 * (1.0 - ratio.median), 100.0 * ratio.spread)
+            }
+            None if effect.stages.is_empty() => "".into(),
+            None => format!("{share:5.1} %"),
+        };
+        let _ = write!(t, "\n  {:<22} {shown:<15} {}", effect.name, effect.cause);
+    }
+    let _ = write!(
+        t,
+        "\n  * inside stages that others share: the difference from a trial without it, {TURNS} turns of {steps} steps each"
+    );
+    Ok(())
 }

@@ -3,6 +3,7 @@
 mod check;
 mod crossings;
 mod devices;
+pub mod effects;
 mod findings;
 mod mesh;
 mod picture;
@@ -11,6 +12,7 @@ mod report;
 mod resume;
 mod rows;
 mod summary;
+pub mod turns;
 
 pub use check::check;
 pub use devices::devices;
@@ -27,6 +29,7 @@ use crate::error::{Error, Result};
 use crate::fabric;
 use crate::measure::yarns;
 use crate::mesh::{Mesh, Ply};
+use crate::output::checkpoint::Checkpoint;
 use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH};
 use crate::output::{directory, file, vtu};
 use crate::schedule::Load;
@@ -39,12 +42,12 @@ use resume::Start;
 use rows::STRESS;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// The case in a folder of results, with every default written out.
-const CASE: &str = "case.json";
+pub const CASE: &str = "case.json";
 
 /// What the command line says about a run, beyond the case.
 #[derive(Debug, Clone)]
@@ -79,14 +82,17 @@ pub enum Machine {
 }
 
 /// The machine that was asked for, ready to make backends.
-fn make(precision: Precision, options: &Options) -> Result<Make> {
-    let wanted = match options.machine {
+///
+/// # Errors
+/// No such machine here.
+pub fn make(precision: Precision, machine: Machine, threads: Option<usize>, adapter: &str) -> Result<Make> {
+    let wanted = match machine {
         Machine::Cpu => false,
         Machine::Gpu => true,
         Machine::Auto => precision == Precision::F32 && gpu::devices().first().is_some_and(|d| d.is_discrete),
     };
-    let device = if wanted { Some(Device::open(&options.adapter)?) } else { None };
-    Ok(Make { precision, threads: options.threads.unwrap_or(0), device, ..Make::default() })
+    let device = if wanted { Some(Device::open(adapter)?) } else { None };
+    Ok(Make { precision, threads: threads.unwrap_or(0), device, ..Make::default() })
 }
 
 /// What a run found, in ten lines.
@@ -126,13 +132,25 @@ pub fn simulation(loaded: &Loaded, make: Make) -> Result<Simulation> {
     Simulation::new(&loaded.case, friction, mesh, make)
 }
 
+/// A scene in the state that a run of the same case left in a checkpoint.
+///
+/// # Errors
+/// A file that cannot be read, or the state of another scene.
+pub fn simulation_at(loaded: &Loaded, make: Make, state: &Path) -> Result<Simulation> {
+    let mut simulation = simulation(loaded, make)?;
+    let Checkpoint { header, records: [host, _], buffers } = Checkpoint::read(state)?;
+    simulation.restore(host, &header.buffers, &buffers).map_err(|e| Error::file(state, e))?;
+    Ok(simulation)
+}
+
 /// Runs a case.
 ///
 /// # Errors
 /// Bad input, a folder that cannot be used, a guard that stopped the run, or a device that failed; what was computed by then
 /// stays on disk.
 pub fn run(loaded: &Loaded, options: &Options) -> Result<Outcome> {
-    run_on(loaded, options, make(options.precision.unwrap_or(loaded.case.integration.precision), options)?)
+    let precision = options.precision.unwrap_or(loaded.case.integration.precision);
+    run_on(loaded, options, make(precision, options.machine, options.threads, &options.adapter)?)
 }
 
 /// Runs a case on a machine that is ready, whatever the options say of it.
@@ -148,14 +166,23 @@ pub fn run_on(loaded: &Loaded, options: &Options, make: Make) -> Result<Outcome>
         directory::prepare(&options.output, options.force)?;
         write_case(&loaded.case, &options.output)?;
     }
-    let stopped = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stopped);
-    // only the first run of a process can be interrupted: the handler cannot be replaced
-    let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
-    let mut run = Run::new(&loaded, options, simulation, stopped)?;
+    let mut run = Run::new(&loaded, options, simulation, interruption())?;
     run.take_up(start)?;
     let result = run.go();
     run.finish(result)
+}
+
+/// Whether the user has stopped the process, and with it this run and those after it.
+fn interruption() -> Arc<AtomicBool> {
+    static STOPPED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+    let listen = || {
+        let stopped = Arc::new(AtomicBool::new(false));
+        let heard = Arc::clone(&stopped);
+        // without a handler the process ends at once, as if nothing had been asked of it
+        let _ = ctrlc::set_handler(move || heard.store(true, Ordering::Relaxed));
+        stopped
+    };
+    Arc::clone(STOPPED.get_or_init(listen))
 }
 
 /// One run with its files.

@@ -2,7 +2,6 @@
 
 use super::{Simulation, StressMean};
 use crate::contact::penalty;
-use crate::dynamics::integrate::{WORK_DAMPING, WORK_GRAVITY, WORK_INERTIA};
 use crate::error::Result;
 use crate::kernel::row::Row;
 use crate::kernel::stage::Stage;
@@ -107,9 +106,13 @@ impl Simulation {
     pub(super) fn add_work(&mut self, totals: &[f64]) {
         let places = &self.model.totals;
         let only = |sums: Option<Sums>| sums.map_or(0.0, |sums| sums.of(totals, 0));
-        self.energies.damping += places.work.of(totals, WORK_DAMPING);
-        self.energies.inertia += places.work.of(totals, WORK_INERTIA);
-        self.energies.gravity += places.work.of(totals, WORK_GRAVITY);
+        if let Some(work) = places.work {
+            let done = |plane: Option<usize>| plane.map_or(0.0, |plane| work.of(totals, plane));
+            let [damping, inertia, gravity] = places.works.planes().map(done);
+            self.energies.damping += damping;
+            self.energies.inertia += inertia;
+            self.energies.gravity += gravity;
+        }
         self.energies.thermal += only(places.thermal);
         self.energies.prescribed += only(places.reaction);
     }
@@ -119,7 +122,9 @@ impl Simulation {
         self.energies.contact = self.model.totals.ties.map_or(0.0, |ties| ties.of(totals, 0));
         for sums in &self.model.totals.contact {
             self.energies.contact += sums.of(totals, penalty::SUM_ENERGY);
-            self.energies.friction += sums.of(totals, penalty::SUM_FRICTION);
+            if self.model.active.friction {
+                self.energies.friction += sums.of(totals, penalty::SUM_FRICTION);
+            }
             self.energies.contact_damping += sums.of(totals, penalty::SUM_DAMPING);
             self.energies.radius += sums.of(totals, penalty::SUM_RADIUS);
         }
@@ -130,14 +135,14 @@ impl Simulation {
         if self.mesh.period.is_none() {
             return;
         }
-        let places = &self.model.totals;
+        let (places, virial) = (&self.model.totals, penalty::virial(self.model.active.friction));
         let old = self.schedule.row(from.max(0.0), 1.0, 1.0).gradient;
         let new = self.schedule.row(to, 1.0, 1.0).gradient;
         for i in 0..3 {
             for j in 0..3 {
                 let component = 3 * i + j;
                 let elements: f64 = places.stress.iter().map(|sums| sums.of(totals, component)).sum();
-                let contact = places.contact.iter().map(|sums| sums.of(totals, penalty::SUM_VIRIAL + component));
+                let contact = places.contact.iter().map(|sums| sums.of(totals, virial + component));
                 let sum = elements + contact.sum::<f64>();
                 self.stress.sum[i][j] += sum;
                 self.energies.external += sum / steps as f64 * (new[i][j] - old[i][j]);

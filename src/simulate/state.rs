@@ -141,12 +141,12 @@ impl Simulation {
         fields
     }
 
-    /// Normal force, pressure and slip of contact slaves, on nodes.
+    /// Normal force, pressure, and with friction slip of contact slaves, on nodes.
     pub(super) fn contact_fields(&self) -> Vec<Field> {
         let b = &self.model.buffers;
         let (Some(keys), Some(state)) = (b.contact_keys, b.contact_state) else { return Vec::new() };
         let (keys, state) = (self.backend.uints(keys), self.backend.scalars(state));
-        let slipped = b.slip.map_or_else(Vec::new, |b| self.backend.scalars(b));
+        let slipped = b.slip.map(|b| self.backend.scalars(b));
         let nodes = self.mesh.nodes.len();
         let (mut force, mut pressure, mut slip) = (vec![0.0; nodes], vec![0.0; nodes], vec![0.0; nodes]);
         let slots = self.capacity.slots;
@@ -154,16 +154,18 @@ impl Simulation {
             let normal: f64 = (0..slots)
                 .map(|s| item * slots + s)
                 .filter(|s| keys[s * penalty::SLOT_KEYS] != EMPTY)
-                .map(|s| state[s * penalty::SLOT_STATE + 3].max(0.0))
+                .map(|s| state[s * self.model.slot_state].max(0.0))
                 .sum();
             force[slave.node] = normal;
-            slip[slave.node] = slipped[item];
+            slip[slave.node] = slipped.as_ref().map_or(0.0, |slipped| slipped[item]);
             if !slave.is_thread && slave.measure > 0.0 {
                 pressure[slave.node] = normal / slave.measure;
             }
         }
         let field = |name: &str, values| Field { name: name.into(), components: 1, values };
-        vec![field("contact_force_n", force), field("contact_pressure_mpa", pressure), field("slip_mm", slip)]
+        let mut fields = vec![field("contact_force_n", force), field("contact_pressure_mpa", pressure)];
+        fields.extend(slipped.map(|_| field("slip_mm", slip)));
+        fields
     }
 
     /// Hash of all persistent buffers and the step number: equal for equal states, bit by bit.

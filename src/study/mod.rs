@@ -1,4 +1,11 @@
-//! Many cases at once: what a table over a folder of scenes needs.
+//! Many runs at once: tables over a folder of scenes, and how results differ.
+//!
+//! [`difference`] holds the mathematics of comparing curves, [`results`] reads them from the folder of a run, and
+//! [`compare`] says how two folders differ; [`effects`] turns off the effects of a scene one by one.
 
+pub mod compare;
+pub mod difference;
+pub mod effects;
+pub mod results;
 pub mod scene;
 pub mod stability;

@@ -1,0 +1,293 @@
+//! Stages of contact: the grid, then candidates and forces of every kind of pair that can touch; ties.
+
+use super::conditions::Conditions;
+use super::effects::Active;
+use super::surfaces::Surfaces;
+use super::threads::Threads;
+use super::ties::Ties;
+use super::{Builder, Capacity, Slave, after, beside, coded, own, thickness, waiting};
+use crate::case::effects::Contact;
+use crate::contact::{EMPTY, Params, candidates, grid, penalty, slot_state, threads, tie};
+use crate::kernel::buffer::{Buffer, Initial, Kind};
+use crate::kernel::position::quanta;
+use crate::kernel::stage::{Access, Code, Stage, flagged};
+use crate::mesh::Mesh;
+
+/// Buffers of one kind of contact that the host reads.
+#[derive(Clone, Copy)]
+pub(super) struct ContactBuffers {
+    pub sums: Buffer,
+    pub keys: Buffer,
+    pub state: Buffer,
+}
+
+/// What contact adds to a plan.
+pub(super) struct ContactParts {
+    pub params: Params,
+    pub force: Buffer,
+    pub stiffness: Buffer,
+    pub faces: Option<ContactBuffers>,
+    pub pairs: Option<ContactBuffers>,
+    /// Energies of ties, and how many there are.
+    pub ties: Option<(Buffer, usize)>,
+    pub slaves: Vec<Slave>,
+}
+
+/// What contact needs to know of the scene.
+pub(super) struct ContactScene<'a> {
+    pub chosen: &'a Contact,
+    pub active: Active,
+    pub friction: f64,
+    pub mesh: &'a Mesh,
+    pub threads: &'a Threads,
+    pub conditions: &'a Conditions,
+    pub ties: Ties,
+    pub capacity: Capacity,
+    pub reference: Buffer,
+    pub quanta: Buffer,
+    pub remainder: Buffer,
+    pub velocity: Buffer,
+    pub mass: Buffer,
+    pub status: Buffer,
+    pub ends: Buffer,
+    pub beams: Buffer,
+}
+
+/// Where bodies near each other are found.
+struct Search {
+    counts: Buffer,
+    lists: Buffer,
+    boxes: Buffer,
+}
+
+/// Tables of bodies with faces.
+struct Faces {
+    slabs: Buffer,
+    bodies: Buffer,
+    rings: Buffer,
+}
+
+impl ContactScene<'_> {
+    /// Adds the stages of the pairs that can touch, and of ties.
+    pub fn add(&self, b: &mut Builder) -> ContactParts {
+        let surfaces = Surfaces::new(self.mesh, self.threads, self.chosen, self.active);
+        let nodes = self.mesh.nodes.len();
+        let slabs = surfaces.slabs.len() / grid::SLAB;
+        let params = self.params(&surfaces, slabs);
+        let force = b.add("contact force", Kind::Int, 3 * nodes, false, Initial::Zero);
+        let stiffness = b.add("contact stiffness", Kind::Int, nodes, false, Initial::Zero);
+        let sums = (force, stiffness);
+        let (mut faces, mut pairs) = (None, None);
+        if self.active.searches() {
+            let paired = if self.active.thread_thread { self.threads.thread.len() } else { 0 };
+            let cells = (params.cells[0] * params.cells[1]) as usize;
+            let counts = b.add("items of cells", Kind::Uint, cells, false, Initial::Zero);
+            let lists = b.add("cells", Kind::Uint, cells * self.capacity.cell, false, Initial::Zero);
+            let boxes = b.scratch("boxes", grid::BOX * (slabs + paired));
+            let search = Search { counts, lists, boxes };
+            b.plan.search.push(after::<grid::Clear>("clear grid", cells, 4096, &[], &[(counts, own(1, 1))], params));
+            let tables = (slabs > 0).then(|| self.slabs(b, &search, &surfaces, params));
+            if paired > 0 {
+                self.beams_to_grid(b, &search, slabs, paired, params);
+            }
+            faces = tables.map(|tables| self.faces(b, &search, &tables, &surfaces, sums, params));
+            pairs = (paired > 0).then(|| self.pairs(b, &search, sums, params));
+        }
+        let ties = self.active.ties.then(|| self.tied(b, sums, params));
+        let slaves = surfaces
+            .slaves
+            .chunks_exact(penalty::SLAVE)
+            .zip(&surfaces.measure)
+            .map(|(s, measure)| Slave { node: s[0] as usize, measure: *measure, is_thread: s[1] == EMPTY })
+            .collect();
+        ContactParts { params, force, stiffness, faces, pairs, ties, slaves }
+    }
+
+    /// Buffers of positions.
+    fn place(&self) -> [Buffer; 3] {
+        [self.reference, self.quanta, self.remainder]
+    }
+
+    fn status(&self) -> (Buffer, Access) {
+        (self.status, Access::Atomic)
+    }
+
+    /// What puts items into the grid.
+    fn to_grid(&self, search: &Search) -> [(Buffer, Access); 4] {
+        let Search { counts, lists, boxes } = *search;
+        [(counts, Access::Atomic), (lists, Access::Scatter), (boxes, own(1, grid::BOX)), self.status()]
+    }
+
+    /// Yarns in the grid.
+    fn slabs(&self, b: &mut Builder, search: &Search, surfaces: &Surfaces, params: Params) -> Faces {
+        let bodies = b.indices("bodies", bytemuck::cast_slice(&surfaces.bodies).to_vec());
+        let rings = b.indices("ring lines", surfaces.ring_lines.clone());
+        let slabs = b.indices("slabs", surfaces.slabs.clone());
+        let reads = [&self.place()[..], &[slabs, bodies, rings]].concat();
+        let kernel = flagged!(grid::FillSlabs; self.active.periodic);
+        let count = surfaces.slabs.len() / grid::SLAB;
+        let stage = coded(kernel, "yarns to grid", count, 32, &reads, &self.to_grid(search), params);
+        b.plan.search.push(waiting(stage));
+        Faces { slabs, bodies, rings }
+    }
+
+    /// Threads in the grid, behind the slabs of yarns.
+    fn beams_to_grid(&self, b: &mut Builder, search: &Search, slabs: usize, beams: usize, params: Params) {
+        let reads = [&self.place()[..], &[self.ends, self.beams]].concat();
+        let kernel = flagged!(grid::FillBeams; self.active.periodic);
+        let stage = coded(kernel, "threads to grid", beams, 32, &reads, &self.to_grid(search), params);
+        // what fills the grid may run side by side
+        b.plan.search.push(Stage { first: slabs, waits: slabs == 0, ..stage });
+    }
+
+    /// Nodes of yarn surfaces and of threads against yarns, stages by kind.
+    fn faces(
+        &self,
+        b: &mut Builder,
+        search: &Search,
+        tables: &Faces,
+        surfaces: &Surfaces,
+        (force, stiffness): (Buffer, Buffer),
+        params: Params,
+    ) -> ContactBuffers {
+        let (count, slots, size) = (surfaces.count(), self.capacity.slots, params.state as usize);
+        let Active { friction, periodic, .. } = self.active;
+        let slaves = b.indices("slaves", surfaces.slaves.clone());
+        let values = b.table("slave values", surfaces.values.clone());
+        let keys_len = penalty::SLOT_KEYS * slots * count;
+        let keys = b.add("contact candidates", Kind::Uint, keys_len, true, Initial::Uint(vec![EMPTY; keys_len]));
+        let state = b.add("contact state", Kind::Scalar, size * slots * count, true, Initial::Zero);
+        let sums = b.scratch("contact sums", penalty::sums(friction, periodic) * count);
+        let keys_own = (keys, own(1, penalty::SLOT_KEYS * slots));
+        let state_own = (state, own(1, size * slots));
+        let near = [
+            &[slaves, values, tables.slabs, tables.bodies, tables.rings][..],
+            &self.place(),
+            &[search.counts, search.lists, search.boxes],
+        ]
+        .concat();
+        let found = [keys_own, state_own, self.status()];
+        let touched =
+            [&[slaves, values, tables.bodies, tables.rings][..], &self.place(), &[self.velocity, self.mass]].concat();
+        let pushed = [
+            keys_own,
+            state_own,
+            (sums, own(1, penalty::sums(friction, periodic))),
+            (force, Access::Atomic),
+            (stiffness, Access::Atomic),
+            self.status(),
+        ];
+        let yarns = surfaces.slaves.chunks_exact(penalty::SLAVE).filter(|slave| slave[1] != EMPTY).count();
+        let kinds = [
+            (false, 0..yarns, "yarn-yarn candidates", "yarn-yarn contact"),
+            (true, yarns..count, "thread-yarn candidates", "thread-yarn contact"),
+        ];
+        let mut waits = true;
+        for (thread, items, search_name, name) in kinds.into_iter().filter(|kind| !kind.1.is_empty()) {
+            let kernel = flagged!(candidates::Candidates; thread, periodic);
+            let stage = coded(kernel, search_name, items.len(), 64, &near, &found, params);
+            b.plan.search.push(Stage { first: items.start, waits, ..stage });
+            let kernel = flagged!(penalty::Penalty; thread, friction, periodic);
+            let stage = coded(kernel, name, items.len(), 64, &touched, &pushed, params);
+            b.plan.step.push(Stage { first: items.start, ..stage });
+            waits = false;
+        }
+        ContactBuffers { sums, keys, state }
+    }
+
+    /// Beams against beams.
+    fn pairs(
+        &self,
+        b: &mut Builder,
+        search: &Search,
+        (force, stiffness): (Buffer, Buffer),
+        params: Params,
+    ) -> ContactBuffers {
+        let (beams, slots, size) = (self.threads.thread.len(), self.capacity.beam_slots, params.state as usize);
+        let Active { friction, periodic, .. } = self.active;
+        let of = b.indices("threads of beams", self.threads.thread.clone());
+        let arcs = b.table("arc lengths", self.threads.arcs.clone());
+        let keys = b.add("beam pairs", Kind::Uint, slots * beams, true, Initial::Uint(vec![EMPTY; slots * beams]));
+        let state = b.add("beam pair state", Kind::Scalar, size * slots * beams, true, Initial::Zero);
+        let sums = b.scratch("beam pair sums", penalty::sums(friction, periodic) * beams);
+        let common = [&[self.ends, self.beams][..], &self.place()].concat();
+        let reads = [&common[..], &[of, arcs, search.counts, search.lists, search.boxes]].concat();
+        let keys_own = (keys, own(1, slots));
+        let state_own = (state, own(1, size * slots));
+        let writes = [keys_own, state_own, self.status()];
+        let kernel = flagged!(threads::Pairs; periodic);
+        let stage = coded(kernel, "thread-thread candidates", beams, 32, &reads, &writes, params);
+        b.plan.search.push(waiting(stage));
+        let reads = [&common[..], &[self.velocity, self.mass]].concat();
+        let writes = [
+            keys_own,
+            state_own,
+            (sums, own(1, penalty::sums(friction, periodic))),
+            (force, Access::Atomic),
+            (stiffness, Access::Atomic),
+            self.status(),
+        ];
+        let kernel = flagged!(threads::Force; friction, periodic);
+        b.plan.step.push(coded(kernel, "thread-thread contact", beams, 32, &reads, &writes, params));
+        ContactBuffers { sums, keys, state }
+    }
+
+    /// Nodes of cut threads that are held; energies and number of ties.
+    fn tied(&self, b: &mut Builder, (force, stiffness): (Buffer, Buffer), params: Params) -> (Buffer, usize) {
+        let count = self.ties.count();
+        let nodes = b.indices("ties", self.ties.nodes.clone());
+        let values = b.table("tie values", self.ties.values.clone());
+        let energy = b.scratch("tie energies", count);
+        let reads = [nodes, values, self.quanta, self.remainder];
+        let writes = [(energy, own(1, 1)), (force, Access::Atomic), (stiffness, Access::Atomic), self.status()];
+        b.plan.step.push(beside::<tie::Tie>("ties", count, 64, &reads, &writes, params));
+        (energy, count)
+    }
+
+    fn params(&self, surfaces: &Surfaces, slabs: usize) -> Params {
+        /// Aimed size of a cell, mm.
+        const CELL: f64 = 0.5;
+        let mesh = self.mesh;
+        let mut low = [f64::INFINITY; 2];
+        let mut high = [f64::NEG_INFINITY; 2];
+        for x in mesh.nodes.iter().copied().chain(self.conditions.ends(mesh)) {
+            for k in 0..2 {
+                (low[k], high[k]) = (low[k].min(x[k]), high[k].max(x[k]));
+            }
+        }
+        let (origin, size) = match mesh.period {
+            Some(period) => ([0.0; 2], period),
+            // bodies that leave the box share its outermost cells
+            None => ([low[0] - CELL, low[1] - CELL], [high[0] - low[0] + 2.0 * CELL, high[1] - low[1] + 2.0 * CELL]),
+        };
+        let cells = size.map(|s| (libm::floor(s / CELL) as u32).clamp(1, 1024));
+        let stiffest = surfaces.values.chunks_exact(penalty::SLAVE_VALUES).map(|v| v[0]).fold(0.0, f64::max);
+        let stiffest = stiffest.max(self.chosen.thread_thread_penalty_n_mm);
+        let radius = self.threads.radius.iter().copied().fold(0.0, f64::max);
+        let thickness = mesh.blocks.iter().map(|b| thickness(mesh, b)).fold(f64::INFINITY, f64::min);
+        let depth = 0.5 * thickness.min(0.4);
+        let power = |x: f64| libm::exp2(libm::ceil(libm::log2(x)));
+        Params {
+            period: mesh.period.unwrap_or_default().map(quanta),
+            cells,
+            capacity: self.capacity.cell as u32,
+            slots: self.capacity.slots as u32,
+            beam_slots: self.capacity.beam_slots as u32,
+            slabs: slabs as u32,
+            origin: origin.map(|x| x as f32),
+            cell: [0, 1].map(|k| (size[k] / f64::from(cells[k])) as f32),
+            skin: self.chosen.skin_mm as f32,
+            friction: if self.active.friction { self.friction as f32 } else { 0.0 },
+            tangential: self.chosen.tangential_ratio as f32,
+            damping: self.chosen.damping_ratio as f32,
+            // a pair may reach 2²⁷ quanta, a node the sum of sixteen such pairs
+            force_quantum: (power(stiffest * (depth + radius)) / f64::from(1 << 27)) as f32,
+            stiffness_quantum: (power(64.0 * stiffest) / f64::from(1 << 28)) as f32,
+            thread_radius: radius as f32,
+            thread_thread: self.chosen.thread_thread_penalty_n_mm as f32,
+            self_arc: self.chosen.self_contact_arc_mm as f32,
+            depth: depth.min(f64::from(f32::MAX)) as f32,
+            state: slot_state(self.active.friction) as u32,
+        }
+    }
+}

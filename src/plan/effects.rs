@@ -1,0 +1,79 @@
+//! Which effects a scene has: what its case asks for, as far as something in the scene calls for it.
+
+use crate::case::Case;
+use crate::case::steps::Step;
+use crate::dynamics::fibre_lines::Group;
+use crate::dynamics::integrate::Works;
+use crate::mesh::Mesh;
+
+/// The effects of a plan. One that is not here has no buffer, no stage and no text in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Active {
+    /// Contact by kind of pair.
+    pub thread_yarn: bool,
+    pub yarn_yarn: bool,
+    pub thread_thread: bool,
+    pub friction: bool,
+    pub bending: bool,
+    /// Threads shrink in a pretension step.
+    pub thermal: bool,
+    pub gravity: bool,
+    pub damping: bool,
+    pub periodic: bool,
+    pub fibre_lines: bool,
+    pub contact_mass: bool,
+    /// Cut threads are held at yarns.
+    pub ties: bool,
+}
+
+impl Active {
+    /// Effects of a case with a friction coefficient on its mesh, whose fibre lines are known, and whether threads are tied.
+    pub fn new(case: &Case, friction: f64, mesh: &Mesh, lines: &[Group], ties: bool) -> Self {
+        let effects = &case.effects;
+        let (yarns, threads) = (mesh.blocks.len(), mesh.threads.len());
+        let contact = effects.contact.as_ref();
+        let thread_yarn = contact.is_some_and(|c| c.thread_yarn && yarns > 0 && threads > 0);
+        let yarn_yarn = contact.is_some_and(|c| c.yarn_yarn && yarns > 1);
+        let thread_thread = contact.is_some_and(|c| c.thread_thread && beams_can_meet(mesh, c.self_contact_arc_mm));
+        let touches = thread_yarn || yarn_yarn || thread_thread;
+        let tightens = case.steps.iter().any(|step| matches!(step, Step::Pretension { .. }));
+        Self {
+            thread_yarn,
+            yarn_yarn,
+            thread_thread,
+            friction: touches && friction > 0.0 && contact.is_some_and(|c| c.friction),
+            bending: effects.bending && mesh.threads.iter().any(|t| t.bending > 0.0 && t.beams() > 1),
+            thermal: tightens && mesh.threads.iter().any(|t| t.thermal_strain != 0.0),
+            gravity: effects.gravity_mm_s2.is_some_and(|g| g != [0.0; 3]),
+            damping: effects.damping.as_ref().is_some_and(|d| {
+                d.rate_per_s > 0.0 || d.thread_settle_rate_per_s > 0.0 || d.move_rate_per_s.is_some_and(|r| r > 0.0)
+            }),
+            periodic: mesh.period.is_some(),
+            fibre_lines: !lines.is_empty(),
+            contact_mass: (touches || ties) && effects.contact_mass.as_ref().is_some_and(|mass| mass.factor > 0.0),
+            ties,
+        }
+    }
+
+    /// Whether bodies can meet, so that they must be looked for.
+    pub fn searches(self) -> bool {
+        self.thread_yarn || self.yarn_yarn || self.thread_thread
+    }
+
+    /// What changes the energy of nodes as they are integrated.
+    pub fn works(self) -> Works {
+        Works { damping: self.damping, inertia: self.fibre_lines || self.contact_mass, gravity: self.gravity }
+    }
+}
+
+/// Whether there are two beams far enough apart along their thread, or on two threads.
+fn beams_can_meet(mesh: &Mesh, arc: f64) -> bool {
+    let length = |thread: &crate::mesh::Thread| {
+        let beam = |i| {
+            let [a, b] = thread.beam(i).map(|end| mesh.position(end));
+            libm::sqrt((0..3).map(|k| (b[k] - a[k]) * (b[k] - a[k])).sum())
+        };
+        (0..thread.beams()).map(beam).sum::<f64>()
+    };
+    mesh.threads.len() > 1 || mesh.threads.iter().any(|thread| length(thread) > arc)
+}

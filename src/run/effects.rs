@@ -1,0 +1,239 @@
+//! The effects of a scene by name: what called for each, which stages are there for it alone, and the case without it.
+
+use crate::case::FabricSource;
+use crate::case::domain::{Domain, ThreadEnds};
+use crate::case::effects::Contact;
+use crate::case::read::Loaded;
+use crate::contact::{EMPTY, penalty};
+use crate::kernel::buffer::Buffer;
+use crate::simulate::Simulation;
+
+/// An effect that a scene has.
+pub struct Effect {
+    pub name: &'static str,
+    /// The field of the case that asks for it, or what implies it.
+    pub cause: String,
+    /// Stages that are there for it alone.
+    pub stages: &'static [&'static str],
+    /// Takes it out of a case; `None` where it is what the case describes.
+    pub off: Option<fn(&mut Loaded)>,
+}
+
+impl Effect {
+    /// The case without the effect.
+    pub fn without(&self, loaded: &Loaded) -> Option<Loaded> {
+        self.off.map(|off| {
+            let mut loaded = loaded.clone();
+            off(&mut loaded);
+            if let (Some(fabric), Some(FabricSource::Inline(inline))) = (&loaded.fabric, &mut loaded.case.fabric) {
+                inline.clone_from(&Box::new(fabric.clone()));
+            }
+            loaded
+        })
+    }
+}
+
+/// Changes contact, if there is any.
+fn contact(loaded: &mut Loaded, change: impl Fn(&mut Contact)) {
+    if let Some(contact) = &mut loaded.case.effects.contact {
+        change(contact);
+    }
+}
+
+/// The effects of a scene that has begun.
+pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
+    let (active, effects) = (simulation.model.active, &loaded.case.effects);
+    let written = |path: &str| {
+        let covers = |default: &str| {
+            let inside =
+                |a: &str, b: &str| a.strip_prefix(b).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+            inside(default, path) || inside(path, default)
+        };
+        let default = loaded.defaults.iter().any(|(default, _)| covers(default));
+        if default { format!("{path} by default") } else { path.to_owned() }
+    };
+    let mut found = Vec::new();
+    let mut add = |is_on: bool, name, cause: &dyn Fn() -> String, stages, off| {
+        if is_on {
+            found.push(Effect { name, cause: cause(), stages, off });
+        }
+    };
+    let thread = |largest: fn(&crate::mesh::Thread) -> f64| {
+        simulation
+            .mesh
+            .threads
+            .iter()
+            .map(largest)
+            .fold(0.0, |most: f64, x| if x.abs() > most.abs() { x } else { most })
+    };
+    let [threads_near, yarns_near, beams_near] = near(simulation);
+    let skin = effects.contact.as_ref().map_or(0.0, |contact| contact.skin_mm);
+    add(
+        active.thread_yarn,
+        "thread-yarn contact",
+        &|| {
+            format!(
+                "{}; {threads_near} nodes of threads are closer than {skin} mm to a yarn",
+                written("effects.contact.thread_yarn")
+            )
+        },
+        &["thread-yarn candidates", "thread-yarn contact"],
+        Some(|l| contact(l, |c| c.thread_yarn = false)),
+    );
+    add(
+        active.yarn_yarn,
+        "yarn-yarn contact",
+        &|| {
+            format!(
+                "{}; {yarns_near} nodes of yarns are closer than {skin} mm to another yarn",
+                written("effects.contact.yarn_yarn")
+            )
+        },
+        &["yarn-yarn candidates", "yarn-yarn contact"],
+        Some(|l| contact(l, |c| c.yarn_yarn = false)),
+    );
+    add(
+        active.thread_thread,
+        "thread-thread contact",
+        &|| {
+            format!(
+                "{}; {beams_near} beams are closer than {skin} mm to another beam",
+                written("effects.contact.thread_thread")
+            )
+        },
+        &["threads to grid", "thread-thread candidates", "thread-thread contact"],
+        Some(|l| contact(l, |c| c.thread_thread = false)),
+    );
+    add(
+        active.friction,
+        "friction",
+        &|| match (&loaded.fabric, &loaded.case.domain) {
+            (Some(fabric), _) => {
+                format!("{} and fabric.friction = {}", written("effects.contact.friction"), fabric.friction)
+            }
+            (None, Domain::Mesh(mesh)) => {
+                format!("{} and domain.mesh.friction = {}", written("effects.contact.friction"), mesh.friction)
+            }
+            (None, _) => written("effects.contact.friction"),
+        },
+        &[],
+        Some(|l| contact(l, |c| c.friction = false)),
+    );
+    add(
+        active.searches() && effects.contact.as_ref().is_some_and(|c| c.damping_ratio > 0.0),
+        "contact damping",
+        &|| written("effects.contact.damping_ratio"),
+        &[],
+        Some(|l| contact(l, |c| c.damping_ratio = 0.0)),
+    );
+    add(
+        active.ties,
+        "ties",
+        &|| {
+            let count =
+                simulation.model.plan.step.iter().find(|stage| stage.name == "ties").map_or(0, |stage| stage.count);
+            format!("{}; {count} nodes of cut threads are held", written("domain.specimen.thread_ends"))
+        },
+        &["ties"],
+        Some(|l| {
+            if let Domain::Specimen(specimen) = &mut l.case.domain {
+                specimen.thread_ends = ThreadEnds::Free;
+            }
+        }),
+    );
+    add(
+        active.bending,
+        "bending",
+        &|| format!("{}; a thread has EI = {:.3e} N mm² > 0", written("effects.bending"), thread(|t| t.bending)),
+        &["bend"],
+        Some(|l| l.case.effects.bending = false),
+    );
+    add(
+        active.thermal,
+        "thermal strain",
+        &|| format!("a pretension step, and a thread with a thermal strain of {} in it", thread(|t| t.thermal_strain)),
+        &[],
+        Some(|l| {
+            if let Some(fabric) = &mut l.fabric {
+                fabric.stitch.thermal_strain = 0.0;
+            }
+            if let Domain::Mesh(mesh) = &mut l.case.domain {
+                mesh.threads.iter_mut().for_each(|thread| thread.thermal_strain = 0.0);
+            }
+        }),
+    );
+    add(
+        active.gravity,
+        "gravity",
+        &|| written("effects.gravity_mm_s2"),
+        &[],
+        Some(|l| l.case.effects.gravity_mm_s2 = None),
+    );
+    add(active.damping, "damping", &|| written("effects.damping"), &[], Some(|l| l.case.effects.damping = None));
+    add(
+        active.fibre_lines,
+        "fibre lines",
+        &|| format!("{}; fibres and threads of two nodes or more", written("effects.fibre_lines")),
+        &["fibre lines", "hold"],
+        Some(|l| l.case.effects.fibre_lines = None),
+    );
+    add(
+        active.contact_mass,
+        "contact-aware mass",
+        &|| format!("{}; bodies can touch", written("effects.contact_mass")),
+        &[],
+        Some(|l| l.case.effects.contact_mass = None),
+    );
+    let (mass, truly) = (&simulation.model.mass, &simulation.model.true_mass);
+    let lighter = mass.iter().zip(truly).filter(|(mass, truly)| mass > truly).count();
+    add(
+        lighter > 0,
+        "mass floor",
+        &|| {
+            format!(
+                "{}; {lighter} nodes are lighter than {} of the mean of their body",
+                written("effects.mass_floor"),
+                effects.mass_floor
+            )
+        },
+        &[],
+        Some(|l| l.case.effects.mass_floor = 0.0),
+    );
+    add(active.periodic, "periodicity", &|| "domain.cell".into(), &["total kinetic energy"], None);
+    let prescribed = simulation.prescribed_nodes().len();
+    add(
+        prescribed > 0,
+        "prescribed motion",
+        &|| match &loaded.case.domain {
+            Domain::Mesh(_) => format!("domain.mesh.conditions; {prescribed} nodes"),
+            _ => format!("the clamps of domain.specimen; {prescribed} nodes"),
+        },
+        &["prescribed"],
+        None,
+    );
+    add(
+        true,
+        "energies by mode",
+        &|| "guards look at the balance of energies between steps".into(),
+        &["hex8 energy", "totals", "totals taken", "kinetic energy", "axial energy"],
+        None,
+    );
+    found
+}
+
+/// Nodes of threads and of yarns that have a yarn within reach, and beams that have a beam.
+fn near(simulation: &Simulation) -> [usize; 3] {
+    let buffers = &simulation.model.buffers;
+    let first_keys = |buffer: Option<Buffer>, items: usize| {
+        let keys = buffer.map_or_else(Vec::new, |buffer| simulation.backend().uints(buffer));
+        let row = keys.len() / items.max(1);
+        keys.chunks_exact(row.max(penalty::SLOT_KEYS)).map(|keys| keys[0] != EMPTY).collect::<Vec<bool>>()
+    };
+    let slaves = &simulation.model.slaves;
+    let faces = first_keys(buffers.contact_keys, slaves.len());
+    let of = |is_thread: bool| {
+        faces.iter().zip(slaves).filter(|(near, slave)| **near && slave.is_thread == is_thread).count()
+    };
+    let beams = first_keys(buffers.pair_keys, simulation.mesh.beams());
+    [of(true), of(false), beams.into_iter().filter(|near| *near).count()]
+}
