@@ -189,7 +189,7 @@ impl Simulation {
             speed: 1e9,
             burst: BURST,
             diagnosed: 0,
-            energies: Energies::default(),
+            energies: Energies { hourglass: model.totals.hourglass.map(|_| 0.0), ..Energies::default() },
             start_energy: 0.0,
             largest_flow: 0.0,
             health: Health::default(),

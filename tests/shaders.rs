@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, with};
+use common::{bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, reduced, with};
 use naga::{AddressSpace, ScalarKind, StorageAccess, TypeInner};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -47,9 +47,11 @@ fn scenes() -> Vec<(&'static str, Value)> {
         ("cell", cell),
         ("cell without contact mass", without_mass),
         ("specimen", specimen),
-        ("free", free),
+        ("free", free.clone()),
         ("free with lines and contact", lines),
         ("without gravity", falling),
+        ("cell of reduced hexahedra", reduced(coarse_cell())),
+        ("free reduced hexahedra", reduced(free)),
     ]
 }
 
@@ -84,7 +86,7 @@ macro_rules! fields {
 /// The parameters of each file of kernels, as Rust lays them out.
 fn parameters(file: &str) -> Vec<Field<&'static str>> {
     match file {
-        "elements/hex8" => fields!(elements::hex8::Params: nodes),
+        "elements/hex8" | "elements/hex8_reduced" => fields!(elements::block::Params: nodes),
         "contact/grid" | "contact/candidates" | "contact/penalty" | "contact/threads" | "contact/tie" => fields!(
             contact::Params: period, cells, capacity, slots, beam_slots, slabs, origin, cell, skin, friction, tangential, damping,
             force_quantum, stiffness_quantum, thread_radius, thread_thread, self_arc, depth, state
@@ -189,6 +191,6 @@ fn every_twin_compiles_and_sees_what_its_stage_binds() {
         failed += usize::from(catch_unwind(|| check(&name, &stage, &buffers)).is_err());
     }
     println!("{seen:#?}");
-    assert!(seen.len() == 25, "{} kinds of stages", seen.len());
+    assert!(seen.len() == 28, "{} kinds of stages", seen.len());
     assert_eq!(failed, 0, "stages without a twin that fits; see above");
 }

@@ -1,7 +1,7 @@
 // Accelerations: each node gathers its corner slots in a fixed order, adds contact, and divides by its mass.
 
 #include "kernel/row"
-#include "elements/hex8"
+#include "elements/mod"
 
 // Corner slots a solid node gathers.
 const SOLID: u32 = 8u;

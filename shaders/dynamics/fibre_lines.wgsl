@@ -4,7 +4,7 @@
 #define REFERENCE
 #include "kernel/node"
 #include "kernel/vector"
-#include "elements/hex8"
+#include "elements/mod"
 
 #if ROOT
 // Integers of a group in the table.

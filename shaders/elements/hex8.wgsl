@@ -1,66 +1,19 @@
 // Fully integrated 8-node hexahedron: one invocation works on one lane of a block.
 
-// Hexahedra in a block.
-const LANES: u32 = 16u;
+#include "elements/block"
 
-#if ROOT
-#include "kernel/row"
-#include "kernel/position"
-#include LAW
-
-// Numbers of a shape, and of a block in the buffers that are written.
+// Numbers of a shape.
 const SHAPE: u32 = 80u * LANES;
-const SLOTS: u32 = 24u * LANES;
-const VIRIAL: u32 = 9u * LANES;
-const ENERGY: u32 = 5u * LANES;
-const BOUND: u32 = 8u * LANES;
 
 // One-dimensional shape function at its own and at the opposite Gauss point.
 const NEAR: f32 = 0.7886751345948129;
 const FAR: f32 = 0.21132486540518713;
-
-struct Params {
-    // Nodes in a plane of the position buffers.
-    nodes: u32,
-}
-
-@group(2) @binding(1) var<uniform> params: Params;
-
-@group(1) @binding(0) var<storage, read> headers: array<u32>;
-@group(1) @binding(1) var<storage, read> corners: array<u32>;
-@group(1) @binding(2) var<storage, read> quanta: array<i32>;
-@group(1) @binding(3) var<storage, read> remainder: array<f32>;
-@group(1) @binding(4) var<storage, read> shapes: array<f32>;
-@group(1) @binding(5) var<storage, read> frames: array<f32>;
-@group(1) @binding(6) var<storage, read> materials: array<f32>;
-@group(1) @binding(7) var<storage, read_write> out: array<f32>;
-#if PERIODIC
-@group(1) @binding(8) var<storage, read_write> out_virial: array<f32>;
-#endif
-
-// A hexahedron: where its numbers start in the tables.
-struct Hex {
-    corners: u32,
-    shape: u32,
-    frame: u32,
-    material: u32,
-}
 
 // Derivatives with respect to ξ, η and ζ, each at the four points of the other two directions.
 struct Derivatives {
     x: array<vec3<f32>, 4>,
     y: array<vec3<f32>, 4>,
     z: array<vec3<f32>, 4>,
-}
-
-fn hex(block: u32, lane: u32) -> Hex {
-    let header = 4u * block;
-    return Hex(
-        8u * LANES * block + lane,
-        SHAPE * headers[header + 2u] + lane,
-        9u * headers[header + 1u],
-        PARAMETERS * headers[header],
-    );
 }
 
 // Row k of the inverse Jacobian at a Gauss point, halved.
@@ -73,41 +26,9 @@ fn volume(h: Hex, point: u32) -> f32 {
     return shapes[h.shape + (10u * point + 9u) * LANES];
 }
 
-fn frame(h: Hex) -> Tensor {
-    let q = h.frame;
-    return Tensor(
-        vec3<f32>(frames[q], frames[q + 1u], frames[q + 2u]),
-        vec3<f32>(frames[q + 3u], frames[q + 4u], frames[q + 5u]),
-        vec3<f32>(frames[q + 6u], frames[q + 7u], frames[q + 8u]),
-    );
-}
-
-fn material(h: Hex) -> array<f32, PARAMETERS> {
-    let p = h.material;
-    return array<f32, PARAMETERS>(
-        materials[p],
-        materials[p + 1u],
-        materials[p + 2u],
-        materials[p + 3u],
-        materials[p + 4u],
-        materials[p + 5u],
-        materials[p + 6u],
-        materials[p + 7u],
-    );
-}
-
-fn node_quanta(node: u32) -> vec3<i32> {
-    return vec3<i32>(quanta[node], quanta[node + params.nodes], quanta[node + 2u * params.nodes]);
-}
-
-fn node_remainder(node: u32) -> vec3<f32> {
-    return vec3<f32>(remainder[node], remainder[node + params.nodes], remainder[node + 2u * params.nodes]);
-}
-
 // Displacement of a corner (in mesh order) from a position, in the fibre's frame.
-fn displacement(h: Hex, corner: u32, from_quanta: vec3<i32>, from_remainder: vec3<f32>, q: Tensor) -> vec3<f32> {
-    let node = corners[h.corners + corner * LANES];
-    let global = vec3<f32>(node_quanta(node) - from_quanta) * QUANTUM + (node_remainder(node) - from_remainder);
+fn local_displacement(h: Hex, corner: u32, from_quanta: vec3<i32>, from_remainder: vec3<f32>, q: Tensor) -> vec3<f32> {
+    let global = displacement(h, corner, from_quanta, from_remainder);
     return fma(q[2], global.zzz, fma(q[1], global.yyy, q[0] * global.x));
 }
 
@@ -117,13 +38,13 @@ fn derivatives(h: Hex, q: Tensor) -> Derivatives {
     let at = node_quanta(node);
     let rest = node_remainder(node);
     // binary order; the first corner does not move against itself
-    let u1 = displacement(h, 1u, at, rest, q);
-    let u2 = displacement(h, 3u, at, rest, q);
-    let u3 = displacement(h, 2u, at, rest, q);
-    let u4 = displacement(h, 4u, at, rest, q);
-    let u5 = displacement(h, 5u, at, rest, q);
-    let u6 = displacement(h, 7u, at, rest, q);
-    let u7 = displacement(h, 6u, at, rest, q);
+    let u1 = local_displacement(h, 1u, at, rest, q);
+    let u2 = local_displacement(h, 3u, at, rest, q);
+    let u3 = local_displacement(h, 2u, at, rest, q);
+    let u4 = local_displacement(h, 4u, at, rest, q);
+    let u5 = local_displacement(h, 5u, at, rest, q);
+    let u6 = local_displacement(h, 7u, at, rest, q);
+    let u7 = local_displacement(h, 6u, at, rest, q);
     return Derivatives(
         interpolate(u1, u3 - u2, u5 - u4, u7 - u6),
         interpolate(u2, u3 - u1, u6 - u4, u7 - u5),
@@ -163,12 +84,6 @@ fn others(point: u32) -> vec3<u32> {
     let j = (point >> 1u) & 1u;
     let k = point >> 2u;
     return vec3<u32>(j + 2u * k, i + 2u * k, i + 2u * j);
-}
-
-// The macroscopic gradient in the fibre's frame, Qᵀ A Q.
-fn macroscopic(q: Tensor) -> Tensor {
-    let g = gradient();
-    return (q * Tensor(g[0], g[1], g[2])) * transpose(q);
 }
 
 // H at a Gauss point.
@@ -212,21 +127,6 @@ fn add_point(
     (*sum).forces.z[at.z] = (*sum).forces.z[at.z] - inverse(h, point, 2u) * weighted;
 }
 
-// Writes three components, a lane apart.
-fn store(at: u32, a: vec3<f32>) {
-    out[at] = a.x;
-    out[at + LANES] = a.y;
-    out[at + 2u * LANES] = a.z;
-}
-
-#if PERIODIC
-fn add_virial(at: u32, a: vec3<f32>) {
-    out_virial[at] = out_virial[at] + a.x;
-    out_virial[at + LANES] = out_virial[at + LANES] + a.y;
-    out_virial[at + 2u * LANES] = out_virial[at + 2u * LANES] + a.z;
-}
-#endif
-
 fn force(number: u32) {
     let block = number / LANES;
     let lane = number % LANES;
@@ -258,12 +158,7 @@ fn force(number: u32) {
     store(at + 18u * LANES, (x[3] + y[3] + z[3]) * q);
     store(at + 21u * LANES, (y[2] - x[3] + z[2]) * q);
 #if PERIODIC
-    // Q A Qᵀ
-    let turned = (transpose(q) * sum.stress) * q;
-    let start = VIRIAL * block + lane;
-    add_virial(start, turned[0]);
-    add_virial(start + 3u * LANES, turned[1]);
-    add_virial(start + 6u * LANES, turned[2]);
+    add_virial(block, lane, q, sum.stress);
 #endif
 }
 #endif
@@ -338,5 +233,4 @@ fn bound(number: u32) {
     out[at + 6u * LANES] = rows[7];
     out[at + 7u * LANES] = rows[6];
 }
-#endif
 #endif

@@ -46,7 +46,7 @@ pub struct Case {
     /// Load steps.
     #[schemars(length(min = 1, max = 1000))]
     pub steps: Vec<Step>,
-    /// Time integration.
+    /// Integration in time, and over hexahedra.
     #[serde(default)]
     pub integration: Integration,
     /// What is written.

@@ -5,7 +5,7 @@
 //! K/m of contact is reported for the choice of the time step.
 
 use crate::contact::status::CONTACT_RATE;
-use crate::elements::hex8::LANES;
+use crate::elements::LANES;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};

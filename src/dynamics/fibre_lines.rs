@@ -11,7 +11,7 @@
 //! The sweep runs along a group of up to sixteen lines at once, one line a lane. The WGSL twin gives each line a workgroup and
 //! solves the same system, bordered by its last row, by parallel cyclic reduction.
 
-use crate::elements::hex8::LANES;
+use crate::elements::LANES;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::QUANTUM;
 use crate::kernel::shader::{Shader, Share, when};

@@ -1,7 +1,7 @@
 //! The limit of the time step, node by node: a row-sum bound K of all stiffness that is integrated explicitly gives
 //! ω² ≤ max K/m (Gershgorin), hence dt ≤ 2 √(m/K).
 
-use crate::elements::hex8::LANES;
+use crate::elements::LANES;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};

@@ -5,7 +5,7 @@
 //! invocations takes every 64th number, then the upper half is added to the lower until one sum is left. The CPU keeps the
 //! same sums side by side. The host adds the parts in f64.
 
-use crate::elements::hex8::LANES;
+use crate::elements::LANES;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::shader::{Shader, Share, WORKGROUP};
 use crate::kernel::stage::{Io, Kernel};

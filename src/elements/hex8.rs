@@ -1,72 +1,23 @@
 //! Fully integrated 8-node hexahedron, total Lagrangian, 2 × 2 × 2 Gauss points.
 //!
-//! Hexahedra are stored in blocks of sixteen, lane by lane; straight extruded yarns share few reference shapes, so a block
-//! names a *shape* (inverse Jacobians and volumes of its sixteen lanes) instead of keeping one. The derivatives of the
-//! trilinear shape functions are products of one-dimensional factors: they are taken direction by direction (sum
-//! factorisation), which costs a third of the textbook sum over corners.
-//!
-//! Displacements enter as differences to the first corner, turned into the fibre's frame; a macroscopic gradient F̄ − I is
-//! added to H. Corner order in registers is binary, `i + 2 j + 4 k` for (ξ, η, ζ).
+//! The derivatives of the trilinear shape functions are products of one-dimensional factors: they are taken direction by
+//! direction (sum factorisation), which costs a third of the textbook sum over corners. Displacements are turned into the
+//! fibre's frame first; a macroscopic gradient F̄ − I is added to H.
 
-use crate::kernel::lane::{Lane, Real};
-use crate::kernel::position::difference;
+use super::LANES;
+use super::block::{BINARY, Lanes, OUT, Params};
+use crate::kernel::lane::Lane;
 use crate::kernel::shader::{Shader, Share};
 use crate::kernel::stage::{Io, Kernel};
 use crate::materials::{Material, PARAMETERS, Tensor, jacobian};
-use bytemuck::{Pod, Zeroable};
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Hexahedra in a block.
-pub const LANES: usize = 16;
 /// Numbers of a shape: at each Gauss point, 9 of the inverse Jacobian (halved) and the volume; times lanes.
-pub const SHAPE: usize = 8 * 10 * LANES;
-/// Corner slots of a block: 8 corners × 3 components × lanes.
-pub const SLOTS: usize = 24 * LANES;
-/// Numbers of a block's stress sum Σ w P, N·mm.
-pub const VIRIAL: usize = 9 * LANES;
-/// Numbers of a block's energies by mode (4), mJ, and smallest Jacobian (1).
-pub const ENERGY: usize = 5 * LANES;
-/// Numbers of a block's corner stiffness bounds, N/mm.
-pub const BOUND: usize = 8 * LANES;
-
-/// Binary corner index of each corner in mesh order.
-pub const BINARY: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
-
-/// What the kernels need to know of a block.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable, PartialEq, Eq)]
-pub struct Header {
-    /// Row of the material table.
-    pub material: u32,
-    /// Row of the table of fibre frames.
-    pub frame: u32,
-    /// Shape.
-    pub shape: u32,
-    /// 1 if every corner's nodes are consecutive over the lanes.
-    pub contiguous: u32,
-}
-
-/// Constants of the stages.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub struct Params {
-    /// Nodes in a plane of the position buffers.
-    pub nodes: u32,
-}
-
-/// Reads, in binding order.
-pub const HEADERS: usize = 0;
-pub const CORNERS: usize = 1;
-pub const QUANTA: usize = 2;
-pub const REMAINDER: usize = 3;
-pub const SHAPES: usize = 4;
-pub const FRAMES: usize = 5;
-pub const MATERIALS: usize = 6;
-/// The first write.
-const OUT: usize = 7;
-/// The stress sum, for periodic scenes.
-const OUT_VIRIAL: usize = 8;
+pub const SHAPE: usize = 8 * POINT * LANES;
+/// Numbers of a Gauss point in a shape, and which of them is the volume.
+pub const POINT: usize = 10;
+const VOLUME: usize = 9;
 
 /// One-dimensional shape function at its own and at the opposite Gauss point.
 const NEAR: f64 = 0.788_675_134_594_812_9;
@@ -82,107 +33,39 @@ pub struct Energy<M>(PhantomData<M>);
 /// Row sums of the stiffness that fibre lines do not cover.
 pub struct Bound<M>(PhantomData<M>);
 
-/// A block and one register of its lanes.
-struct Lanes<'a, L: Lane> {
-    header: Header,
-    corners: &'a [u32],
-    shape: &'a [L::Scalar],
-    lane: usize,
-    life: PhantomData<L>,
+/// Displacements of the corners relative to the first, in the fibre's frame, by component and binary corner.
+#[inline(always)]
+fn local_displacements<L: Lane>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize) -> [[L; 8]; 3] {
+    let q = lanes.frame(io);
+    let global = lanes.displacements(io, nodes);
+    let mut local = global;
+    for j in 0..3 {
+        for a in 0..8 {
+            local[j][a] = q[2][j].fma(global[2][a], q[1][j].fma(global[1][a], q[0][j] * global[0][a]));
+        }
+    }
+    local
 }
 
-impl<'a, L: Lane> Lanes<'a, L> {
-    #[inline(always)]
-    fn new(io: &'a Io<L::Scalar>, block: usize, lane: usize) -> Self {
-        let header: Header = bytemuck::pod_read_unaligned(bytemuck::cast_slice(&io.uints(HEADERS)[4 * block..][..4]));
-        Self {
-            header,
-            corners: &io.uints(CORNERS)[8 * LANES * block..][..8 * LANES],
-            shape: &io.scalars(SHAPES)[SHAPE * header.shape as usize..][..SHAPE],
-            lane,
-            life: PhantomData,
+/// Row k of the inverse Jacobian at a Gauss point, halved.
+#[inline(always)]
+fn inverse<L: Lane>(lanes: &Lanes<L>, point: usize, k: usize) -> [L; 3] {
+    let first = POINT * point + 3 * k;
+    [lanes.shape(first), lanes.shape(first + 1), lanes.shape(first + 2)]
+}
+
+/// Displacement gradient at a Gauss point, without the macroscopic part.
+#[inline(always)]
+fn gradient<L: Lane>(lanes: &Lanes<L>, point: usize, d: &Derivatives<L>) -> Tensor<L> {
+    let at = others(point);
+    let (a, b, c) = (inverse(lanes, point, 0), inverse(lanes, point, 1), inverse(lanes, point, 2));
+    let mut h = [[L::new(0.0); 3]; 3];
+    for j in 0..3 {
+        for i in 0..3 {
+            h[i][j] = d[i][2][at[2]].fma(c[j], d[i][1][at[1]].fma(b[j], d[i][0][at[0]] * a[j]));
         }
     }
-
-    #[inline(always)]
-    fn shape(&self, point: usize, entry: usize) -> L {
-        L::load(&self.shape[(10 * point + entry) * LANES + self.lane..])
-    }
-
-    #[inline(always)]
-    fn frame(&self, io: &Io<L::Scalar>) -> Tensor<L::Scalar> {
-        let q = &io.scalars(FRAMES)[9 * self.header.frame as usize..][..9];
-        [[q[0], q[1], q[2]], [q[3], q[4], q[5]], [q[6], q[7], q[8]]]
-    }
-
-    #[inline(always)]
-    fn material(&self, io: &Io<L::Scalar>) -> [L; PARAMETERS] {
-        let row = &io.scalars(MATERIALS)[PARAMETERS * self.header.material as usize..][..PARAMETERS];
-        let mut parameters = [L::splat(row[0]); PARAMETERS];
-        for (parameter, value) in parameters.iter_mut().zip(row) {
-            *parameter = L::splat(*value);
-        }
-        parameters
-    }
-
-    /// Displacements of the corners relative to the first, in the fibre's frame, by component and binary corner.
-    #[inline(always)]
-    fn displacements(&self, io: &Io<L::Scalar>, frame: &Tensor<L::Scalar>, nodes: usize) -> [[L; 8]; 3] {
-        let (quanta, remainder) = (io.ints(QUANTA), io.scalars(REMAINDER));
-        let zero = L::Scalar::from_f64(0.0);
-        let mut global = [[L::splat(zero); 8]; 3];
-        for (component, row) in global.iter_mut().enumerate() {
-            let (quanta, remainder) = (&quanta[component * nodes..][..nodes], &remainder[component * nodes..][..nodes]);
-            let mut first = ([0i32; LANES], [zero; LANES]);
-            let mut buffer = [zero; LANES];
-            for (corner, &binary) in BINARY.iter().enumerate() {
-                let ids = &self.corners[corner * LANES + self.lane..][..L::WIDTH];
-                if self.header.contiguous == 1 {
-                    let start = ids[0] as usize;
-                    let (q, r) = (&quanta[start..][..L::WIDTH], &remainder[start..][..L::WIDTH]);
-                    if corner == 0 {
-                        first.0[..L::WIDTH].copy_from_slice(q);
-                        first.1[..L::WIDTH].copy_from_slice(r);
-                        continue;
-                    }
-                    for l in 0..L::WIDTH {
-                        buffer[l] = difference(q[l], r[l], first.0[l], first.1[l]);
-                    }
-                } else {
-                    for (l, &id) in ids.iter().enumerate() {
-                        let (q, r) = (quanta[id as usize], remainder[id as usize]);
-                        if corner == 0 {
-                            (first.0[l], first.1[l]) = (q, r);
-                        }
-                        buffer[l] = difference(q, r, first.0[l], first.1[l]);
-                    }
-                }
-                row[binary] = L::load(&buffer);
-            }
-        }
-        let q = splat_tensor::<L>(frame);
-        let mut local = global;
-        for j in 0..3 {
-            for a in 0..8 {
-                local[j][a] = q[2][j].fma(global[2][a], q[1][j].fma(global[1][a], q[0][j] * global[0][a]));
-            }
-        }
-        local
-    }
-
-    /// Displacement gradient at a Gauss point, without the macroscopic part.
-    #[inline(always)]
-    fn gradient(&self, point: usize, d: &Derivatives<L>) -> Tensor<L> {
-        let at = others(point);
-        let mut h = [[L::new(0.0); 3]; 3];
-        for j in 0..3 {
-            let inverse = [self.shape(point, j), self.shape(point, 3 + j), self.shape(point, 6 + j)];
-            for i in 0..3 {
-                h[i][j] = d[i][2][at[2]].fma(inverse[2], d[i][1][at[1]].fma(inverse[1], d[i][0][at[0]] * inverse[0]));
-            }
-        }
-        h
-    }
+    h
 }
 
 /// For each direction, which of the four points of the other two directions a Gauss point is.
@@ -248,40 +131,6 @@ fn corner_forces<L: Lane>(g: &[[L; 4]; 3]) -> [L; 8] {
     f
 }
 
-/// The same tensor in every lane.
-#[inline(always)]
-fn splat_tensor<L: Lane>(a: &Tensor<L::Scalar>) -> Tensor<L> {
-    let mut splat = [[L::splat(a[0][0]); 3]; 3];
-    for i in 0..3 {
-        for j in 0..3 {
-            splat[i][j] = L::splat(a[i][j]);
-        }
-    }
-    splat
-}
-
-/// Qᵀ A Q, or Q A Qᵀ if `out`.
-#[inline(always)]
-fn turn<L: Lane>(q: &Tensor<L>, a: &Tensor<L>, out: bool) -> Tensor<L> {
-    let zero = L::new(0.0);
-    let (mut half, mut full) = ([[zero; 3]; 3], [[zero; 3]; 3]);
-    for i in 0..3 {
-        for j in 0..3 {
-            for k in 0..3 {
-                half[i][j] = a[i][k].fma(if out { q[j][k] } else { q[k][j] }, half[i][j]);
-            }
-        }
-    }
-    for i in 0..3 {
-        for j in 0..3 {
-            for k in 0..3 {
-                full[i][j] = half[k][j].fma(if out { q[i][k] } else { q[k][i] }, full[i][j]);
-            }
-        }
-    }
-    full
-}
-
 /// The twin of a kernel for a law, one lane an invocation.
 const fn shader<M: Material>(kernel: &'static str) -> Shader {
     Shader { law: Some(M::SHADER), share: Share::Invocations(LANES), ..Shader::new("elements/hex8", kernel) }
@@ -295,18 +144,17 @@ trait Visitor<L: Lane> {
 /// Visits the Gauss points of one register of hexahedra with H, and with the volume of the point.
 #[inline(always)]
 fn visit<L: Lane>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize, visitor: &mut impl Visitor<L>) {
-    let frame = lanes.frame(io);
-    let u = lanes.displacements(io, &frame, nodes);
+    let u = local_displacements(io, lanes, nodes);
     let d = [derivatives(&u[0]), derivatives(&u[1]), derivatives(&u[2])];
-    let macroscopic = splat_tensor::<L>(&turn(&frame, &io.row.gradient, false));
+    let macroscopic = lanes.macroscopic(io);
     for point in 0..8 {
-        let mut h = lanes.gradient(point, &d);
+        let mut h = gradient(lanes, point, &d);
         for i in 0..3 {
             for j in 0..3 {
                 h[i][j] = h[i][j] + macroscopic[i][j];
             }
         }
-        visitor.point(lanes, point, &h, lanes.shape(point, 9));
+        visitor.point(lanes, point, &h, lanes.shape(POINT * point + VOLUME));
     }
 }
 
@@ -332,7 +180,7 @@ impl<L: Lane, M: Material, const PERIODIC: bool> Visitor<L> for Stress<L, M, PER
             }
         }
         for k in 0..3 {
-            let inverse = [lanes.shape(point, 3 * k), lanes.shape(point, 3 * k + 1), lanes.shape(point, 3 * k + 2)];
+            let inverse = inverse(lanes, point, k);
             for i in 0..3 {
                 let g = p[i][2].fma(inverse[2], p[i][1].fma(inverse[1], p[i][0] * inverse[0]));
                 self.forces[i][k][at[k]] = self.forces[i][k][at[k]] - g;
@@ -369,6 +217,7 @@ struct Bounds<L: Lane, M> {
 impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
     #[inline(always)]
     fn point(&mut self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, volume: L) {
+        let inverse = [inverse(lanes, point, 0), inverse(lanes, point, 1), inverse(lanes, point, 2)];
         let mut sizes = [L::new(0.0); 8];
         let mut total = L::new(0.0);
         for (a, size) in sizes.iter_mut().enumerate() {
@@ -384,10 +233,7 @@ impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
             let slope = [sign[0] * n[1] * n[2], sign[1] * n[0] * n[2], sign[2] * n[0] * n[1]];
             let mut square = L::new(0.0);
             for j in 1..3 {
-                let across = slope[2].fma(
-                    lanes.shape(point, 6 + j),
-                    slope[1].fma(lanes.shape(point, 3 + j), slope[0] * lanes.shape(point, j)),
-                );
+                let across = slope[2].fma(inverse[2][j], slope[1].fma(inverse[1][j], slope[0] * inverse[0][j]));
                 square = across.fma(across, square);
             }
             *size = square.sqrt();
@@ -409,7 +255,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
         let mut slots = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
-                let lanes = Lanes::<L>::new(io, item, lane);
+                let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
                 let zero = L::new(0.0);
                 let mut stress = Stress::<L, M, PERIODIC> {
                     material: lanes.material(io),
@@ -418,7 +264,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
                     law: PhantomData,
                 };
                 visit(io, &lanes, nodes as usize, &mut stress);
-                let q = splat_tensor::<L>(&lanes.frame(io));
+                let q = lanes.frame(io);
                 let f = &stress.forces;
                 let local = [corner_forces(&f[0]), corner_forces(&f[1]), corner_forces(&f[2])];
                 let out = slots.item(0, item);
@@ -426,19 +272,11 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
                     for i in 0..3 {
                         let f =
                             q[i][2].fma(local[2][binary], q[i][1].fma(local[1][binary], q[i][0] * local[0][binary]));
-                        f.store(&mut out[(3 * corner + i) * LANES + lane..]);
+                        lanes.store_force(out, corner, i, f);
                     }
                 }
                 if PERIODIC {
-                    let sum = turn(&q, &stress.sum, true);
-                    let mut virials = io.own::<L::Scalar>(OUT_VIRIAL);
-                    let out = virials.item(0, item);
-                    for i in 0..3 {
-                        for j in 0..3 {
-                            let place = &mut out[(3 * i + j) * LANES + lane..];
-                            (L::load(place) + sum[i][j]).store(place);
-                        }
-                    }
+                    lanes.add_virial(io, item, &q, &stress.sum);
                 }
             }
         }
@@ -454,7 +292,7 @@ impl<M: Material> Kernel for Energy<M> {
         let mut out = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
-                let lanes = Lanes::<L>::new(io, item, lane);
+                let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
                 let mut energies = Energies::<L, M> {
                     material: lanes.material(io),
                     sum: [L::new(0.0); 4],
@@ -481,7 +319,7 @@ impl<M: Material> Kernel for Bound<M> {
         let mut out = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
-                let lanes = Lanes::<L>::new(io, item, lane);
+                let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
                 let mut bounds =
                     Bounds::<L, M> { material: lanes.material(io), rows: [L::new(0.0); 8], law: PhantomData };
                 visit(io, &lanes, nodes as usize, &mut bounds);

@@ -49,6 +49,15 @@ pub fn choose(choice: &Choice) -> (Law, [f64; PARAMETERS], f64) {
     }
 }
 
+/// Shear modulus of a law at rest, MPa; of yarns the larger one, along or across the fibre.
+pub fn shear_modulus(choice: &Choice) -> f64 {
+    match *choice {
+        // b₂₃ is the shear angle γ, and the energy of small distortion K/8 γ²
+        Choice::Charmetant { k_dist_mpa, k_sh_mpa, .. } => k_sh_mpa.max(0.25 * k_dist_mpa),
+        Choice::NeoHookean { young_mpa, poisson } => young_mpa / (2.0 * (1.0 + poisson)),
+    }
+}
+
 /// Determinant of I + H.
 #[inline(always)]
 pub fn jacobian<L: Lane>(h: &Tensor<L>) -> L {

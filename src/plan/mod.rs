@@ -8,6 +8,8 @@
 mod conditions;
 mod contact;
 mod effects;
+mod hexes;
+mod shapes;
 mod solids;
 mod surfaces;
 mod threads;
@@ -22,19 +24,17 @@ use crate::dynamics::fibre_lines::{self, FibreLines};
 use crate::dynamics::integrate::{self, Integrate};
 use crate::dynamics::time_step;
 use crate::elements::beam2::Beam2;
-use crate::elements::{bend, hex8};
+use crate::elements::{LANES, bend};
 use crate::error::Result;
 use crate::kernel::buffer::{Buffer, Description, Initial, Kind};
 use crate::kernel::position::quanta;
 use crate::kernel::stage::{Access, Code, Kernel, Plan, Stage, flagged};
-use crate::materials::charmetant::Charmetant;
-use crate::materials::neo_hookean::NeoHookean;
-use crate::materials::{Law, Material};
 use crate::mesh::Mesh;
 use bytemuck::Pod;
 use conditions::Conditions;
 use contact::ContactScene;
 pub use effects::Active;
+use hexes::HexBuffers;
 use solids::Solids;
 use threads::Threads;
 use ties::Ties;
@@ -218,7 +218,8 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let periodic = active.periodic;
     let nodes = mesh.nodes.len();
     let first = mesh.first_thread_node();
-    let solids = Solids::new(mesh)?;
+    let hourglass = case.integration.hourglass_control();
+    let solids = Solids::new(mesh, hourglass)?;
     let threads = Threads::new(mesh, active.bending);
     let (hexes, beams, bends) = (solids.headers.len(), threads.thread.len(), threads.pairs.len() / 2);
     let conditions = Conditions::new(case, mesh)?;
@@ -243,31 +244,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let work = (works.count() > 0).then(|| b.scratch("work on nodes", works.count() * nodes));
 
     // forces of elements
-    let materials = b.table("materials", solids.materials.clone());
-    let frames = b.table("fibre frames", solids.frames.clone());
-    let shapes = b.table("shapes", solids.shapes.clone());
-    let headers = b.indices("hex blocks", bytemuck::cast_slice(&solids.headers).to_vec());
-    let corners = b.indices("hex corners", solids.corners.clone());
-    let hex_force = b.scratch("hex corner forces", hex8::SLOTS * hexes);
-    let hex_bound = b.scratch("hex stiffness bounds", hex8::BOUND * hexes);
-    let hex_energy = (hexes > 0).then(|| b.scratch("hex energies", hex8::ENERGY * hexes));
-    let hex_virial = (hexes > 0 && periodic).then(|| b.scratch("hex stress sums", hex8::VIRIAL * hexes));
-    let hex_reads = [headers, corners, quanta_, remainder, shapes, frames, materials];
-    for (law, range) in &solids.laws {
-        let stages = HexStages {
-            params: hex8::Params { nodes: nodes as u32 },
-            blocks: range.clone(),
-            reads: &hex_reads,
-            force: hex_force,
-            virial: hex_virial,
-            energy: hex_energy,
-            bound: hex_bound,
-        };
-        match law {
-            Law::Charmetant => stages.add::<Charmetant>(&mut b),
-            Law::NeoHookean => stages.add::<NeoHookean>(&mut b),
-        }
-    }
+    let hex = HexBuffers::add(&mut b, &solids, [quanta_, remainder], periodic, hourglass.is_some());
     let ends = b.indices("beam ends", threads.ends.clone());
     let beam_table = b.table("beams", threads.beams.clone());
     let beam_force = b.scratch("beam forces", 3 * beams);
@@ -348,7 +325,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         mass_factor: contact_mass.map_or(0.0, |c| c.factor as f32),
         mass_memory: contact_mass.map_or(0.0, |c| c.memory as f32),
     };
-    let mut reads = vec![solid_slots, hex_force, thread_slots, beam_force, mass];
+    let mut reads = vec![solid_slots, hex.force, thread_slots, beam_force, mass];
     if let Some((force, _)) = bend_buffers {
         reads.extend([b.indices("bend slots of thread nodes", threads.bend_slots.clone()), force]);
     }
@@ -420,7 +397,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let constant = constant_stiffness(mesh, &threads, &line_stiffness, &covered);
     let constant = b.table("constant stiffness of nodes", constant);
     let solid_bounds = b.indices("corner bounds of solid nodes", solids.bounds.clone());
-    let reads = [solid_bounds, hex_bound, constant, mass];
+    let reads = [solid_bounds, hex.bound, constant, mass];
     let params = time_step::Params { first_thread };
     let writes = [(element_limit, own(2, 1))];
     b.plan.diagnose.push(after::<time_step::ElementLimit>("element limit", nodes, NODE_GRAIN, &reads, &writes, params));
@@ -441,8 +418,9 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         work,
         element_limit,
         beam_table,
-        hex_energy,
-        hex_virial,
+        hex_energy: hex.energy,
+        hex_hourglass: hex.hourglass,
+        hex_virial: hex.virial,
         beam_tension,
         beam_work,
         beam_virial,
@@ -455,9 +433,9 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         added_mass,
     };
     let (totals, slip) = totals::add(&mut b, &sources);
-    let mut hex_at = vec![0; hexes * hex8::LANES];
+    let mut hex_at = vec![0; hexes * LANES];
     for (hex, (block, lane)) in solids.place.iter().enumerate() {
-        hex_at[block * hex8::LANES + lane] = hex;
+        hex_at[block * LANES + lane] = hex;
     }
 
     let thickness = mesh.blocks.iter().map(|block| thickness(mesh, block)).fold(f64::INFINITY, f64::min);
@@ -469,7 +447,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             remainder,
             velocity,
             status: status_,
-            hex_energy,
+            hex_energy: hex.energy,
             beam_tension,
             contact_force: contact.as_ref().map(|c| c.force),
             contact_stiffness: contact.as_ref().map(|c| c.stiffness),
@@ -497,42 +475,6 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         line_factor,
         limits: Limits { thread_radius: radius, yarn_thickness: thickness },
     })
-}
-
-/// The stages of hexahedra of one law.
-struct HexStages<'a> {
-    params: hex8::Params,
-    blocks: std::ops::Range<usize>,
-    reads: &'a [Buffer],
-    force: Buffer,
-    virial: Option<Buffer>,
-    energy: Option<Buffer>,
-    bound: Buffer,
-}
-
-impl HexStages<'_> {
-    fn add<M: Material>(&self, b: &mut Builder) {
-        /// Blocks in a chunk.
-        const GRAIN: usize = 4;
-        let &Self { params, reads, force, .. } = self;
-        let count = self.blocks.len();
-        let here = |stage: Stage| Stage { first: self.blocks.start, ..stage };
-        let force = (force, own(1, hex8::SLOTS));
-        let force_stage = match self.virial {
-            Some(virial) => {
-                let writes = [force, (virial, own(1, hex8::VIRIAL))];
-                beside::<hex8::Force<M, true>>("hex8", count, GRAIN, reads, &writes, params)
-            }
-            None => beside::<hex8::Force<M, false>>("hex8", count, GRAIN, reads, &[force], params),
-        };
-        b.plan.step.push(here(force_stage));
-        if let Some(energy) = self.energy {
-            let writes = [(energy, own(1, hex8::ENERGY))];
-            b.plan.diagnose.push(here(beside::<hex8::Energy<M>>("hex8 energy", count, GRAIN, reads, &writes, params)));
-        }
-        let writes = [(self.bound, own(1, hex8::BOUND))];
-        b.plan.diagnose.push(here(beside::<hex8::Bound<M>>("hex8 bound", count, GRAIN, reads, &writes, params)));
-    }
 }
 
 /// Largest top-to-bottom distance of a block's first section, mm.
@@ -588,8 +530,8 @@ fn line_groups(mesh: &Mesh, with_threads: bool) -> Vec<fibre_lines::Group> {
         if stations < 2 + usize::from(wrap.is_some()) {
             continue;
         }
-        for start in (0..lines).step_by(hex8::LANES) {
-            let count = (lines - start).min(hex8::LANES);
+        for start in (0..lines).step_by(LANES) {
+            let count = (lines - start).min(LANES);
             let group = fibre_lines::Group {
                 first: (first + start * stations) as u32,
                 lines: count as u32,
@@ -600,7 +542,7 @@ fn line_groups(mesh: &Mesh, with_threads: bool) -> Vec<fibre_lines::Group> {
             match groups.last_mut() {
                 Some(last)
                     if lines == 1
-                        && last.lines < hex8::LANES as u32
+                        && last.lines < LANES as u32
                         && (last.stations, last.closed, last.shift) == (group.stations, group.closed, group.shift)
                         && last.first + last.lines * last.stations == group.first =>
                 {

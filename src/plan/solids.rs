@@ -1,7 +1,9 @@
 //! Tables of the hexahedra: blocks of sixteen lanes, shapes, corner slots of nodes, lumped mass, stiffness of fibre lines.
 
+use super::shapes::{self, GAUSS, Point};
 use crate::dynamics::assemble::{NONE, SOLID};
-use crate::elements::hex8::{Header, LANES};
+use crate::elements::LANES;
+use crate::elements::block::Header;
 use crate::error::{Error, Result};
 use crate::kernel::position::{QUANTUM, quanta};
 use crate::materials::{self, Law};
@@ -41,17 +43,12 @@ struct Hex {
     corners: [Seen; 8],
 }
 
-/// Inverse Jacobian and volume at a Gauss point.
-type Point = ([[f64; 3]; 3], f64);
-
-const GAUSS: f64 = 0.577_350_269_189_625_8;
-
 impl Solids {
-    /// Tables of a mesh.
+    /// Tables of a mesh; with a hourglass coefficient, for hexahedra with reduced integration.
     ///
     /// # Errors
     /// Names a hexahedron that is inside out.
-    pub fn new(mesh: &Mesh) -> Result<Self> {
+    pub fn new(mesh: &Mesh, hourglass: Option<f64>) -> Result<Self> {
         let nodes = mesh.first_thread_node();
         let mut tables = Self {
             mass: vec![0.0; nodes],
@@ -87,7 +84,7 @@ impl Solids {
         for ((law, group), (runs, rest)) in groups {
             let first = tables.headers.len();
             for hexes in runs.chunks(LANES).chain(rest.chunks(LANES)) {
-                tables.push(mesh, &frames[group], group, hexes, &mut shapes)?;
+                tables.push(mesh, hourglass, &frames[group], group, hexes, &mut shapes)?;
             }
             let end = tables.headers.len();
             match tables.laws.last_mut() {
@@ -102,6 +99,7 @@ impl Solids {
     fn push(
         &mut self,
         mesh: &Mesh,
+        hourglass: Option<f64>,
         frame: &[[f64; 3]; 3],
         group: usize,
         hexes: &[Hex],
@@ -110,19 +108,20 @@ impl Solids {
         let number = self.headers.len();
         let last = hexes.len() - 1;
         let lane = |l: usize| &hexes[l.min(last)];
-        let edges = |hex: &Hex| -> Vec<[i32; 3]> {
+        let edges = |hex: &Hex| {
             let origin = mesh.position(hex.corners[0]).map(quanta);
-            hex.corners.map(|c| mesh.position(c).map(quanta)).map(|c| [0, 1, 2].map(|k| c[k] - origin[k])).to_vec()
+            hex.corners.map(|c| mesh.position(c).map(quanta)).map(|c| [0, 1, 2].map(|k| c[k] - origin[k]))
         };
         let mut key: Vec<i32> = Vec::with_capacity(LANES * 24 + 1);
         for l in 0..LANES {
             key.extend(edges(lane(l)).iter().flatten());
             key.push(i32::from(l > last));
         }
-        let mut points = Vec::with_capacity(hexes.len());
+        let mut elements = Vec::with_capacity(hexes.len());
         for (l, hex) in hexes.iter().enumerate() {
             let block = &mesh.blocks[hex.block];
-            let element = points_of(&edges(hex), frame).map_err(|volume| upside_down(mesh, block, hex, volume))?;
+            let corners = local(&edges(hex), frame);
+            let element = shapes::points(&corners).map_err(|volume| upside_down(mesh, block, hex, volume))?;
             self.lump(block, hex, &element);
             self.place[hex.index] = (number, l);
             for (corner, seen) in hex.corners.iter().enumerate() {
@@ -131,21 +130,19 @@ impl Solids {
                 put(&mut self.bounds, seen.node, slot);
                 put(&mut self.slots, seen.node, force);
             }
-            points.push(element);
+            elements.push((element, corners));
         }
         let shape = *shapes.entry((group, key)).or_insert_with(|| {
-            let shape = self.shapes.len() / (80 * LANES);
-            for point in 0..8 {
-                for entry in 0..10 {
-                    for l in 0..LANES {
-                        // stored halved: kernels take differences of corners, twice the derivative
-                        self.shapes.push(match points.get(l).map(|p| &p[point]) {
-                            None => 0.0,
-                            Some((_, volume)) if entry == 9 => *volume,
-                            Some((inverse, _)) => 0.5 * inverse[entry / 3][entry % 3],
-                        });
-                    }
-                }
+            let modulus = materials::shear_modulus(&mesh.blocks[hexes[0].block].material);
+            let numbers = |(points, corners): &([Point; 8], [[f64; 3]; 8])| match hourglass {
+                None => shapes::full(points),
+                Some(coefficient) => shapes::reduced(points, corners, coefficient * modulus),
+            };
+            let numbers: Vec<Vec<f64>> = elements.iter().map(numbers).collect();
+            let size = numbers[0].len();
+            let shape = self.shapes.len() / (size * LANES);
+            for entry in 0..size {
+                self.shapes.extend((0..LANES).map(|l| numbers.get(l).map_or(0.0, |n| n[entry])));
             }
             shape as u32
         });
@@ -210,39 +207,11 @@ fn frame(fibre: [f64; 3]) -> [[f64; 3]; 3] {
     std::array::from_fn(|i| [first[i], second[i], third[i]])
 }
 
-/// Inverse Jacobians in the fibre's frame and volumes at the Gauss points; the volume that is not positive as an error.
-fn points_of(edges: &[[i32; 3]], frame: &[[f64; 3]; 3]) -> std::result::Result<[Point; 8], f64> {
-    let local: Vec<[f64; 3]> = edges
-        .iter()
+/// Corners in mm along the axes of a frame.
+fn local(edges: &[[i32; 3]; 8], frame: &[[f64; 3]; 3]) -> [[f64; 3]; 8] {
+    edges
         .map(|e| e.map(|q| f64::from(q) * QUANTUM))
         .map(|e| std::array::from_fn(|j| frame[0][j] * e[0] + frame[1][j] * e[1] + frame[2][j] * e[2]))
-        .collect();
-    let mut points = [([[0.0; 3]; 3], 0.0); 8];
-    for (point, result) in points.iter_mut().enumerate() {
-        let at = [0, 1, 2].map(|k| if point >> k & 1 == 1 { GAUSS } else { -GAUSS });
-        // jacobian[j][d] = ∂X_j/∂ξ_d
-        let mut j = [[0.0; 3]; 3];
-        for (sign, x) in CORNER_SIGNS.iter().zip(&local) {
-            let f = [0, 1, 2].map(|k| 0.5 * (1.0 + sign[k] * at[k]));
-            let slope = [0.5 * sign[0] * f[1] * f[2], 0.5 * sign[1] * f[0] * f[2], 0.5 * sign[2] * f[0] * f[1]];
-            for (row, x) in j.iter_mut().zip(x) {
-                for (entry, slope) in row.iter_mut().zip(slope) {
-                    *entry += x * slope;
-                }
-            }
-        }
-        let cofactor = |a: usize, b: usize| {
-            let ([r, s], [c, d]) = ([(a + 1) % 3, (a + 2) % 3], [(b + 1) % 3, (b + 2) % 3]);
-            j[r][c] * j[s][d] - j[r][d] * j[s][c]
-        };
-        let volume = j[0][0] * cofactor(0, 0) + j[0][1] * cofactor(0, 1) + j[0][2] * cofactor(0, 2);
-        if volume <= 0.0 || volume.is_nan() {
-            return Err(volume);
-        }
-        // inverse[d][J] = ∂ξ_d/∂X_J
-        *result = (std::array::from_fn(|d| std::array::from_fn(|jj| cofactor(jj, d) / volume)), volume);
-    }
-    Ok(points)
 }
 
 fn upside_down(mesh: &Mesh, block: &Block, hex: &Hex, volume: f64) -> Error {

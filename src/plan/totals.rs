@@ -5,7 +5,9 @@ use crate::contact::{penalty, slip};
 use crate::dynamics::energy;
 use crate::dynamics::integrate::Works;
 use crate::dynamics::totals::{self, Params, Sum, WORST, Worst};
-use crate::elements::hex8::{self, LANES};
+use crate::elements::LANES;
+use crate::elements::block::{ENERGY, VIRIAL};
+use crate::elements::hex8_reduced::HOURGLASS;
 use crate::kernel::buffer::Buffer;
 use crate::kernel::position::quanta;
 use crate::kernel::stage::{Access, Code, Stage, flagged};
@@ -62,6 +64,8 @@ pub struct Totals {
     pub ties: Option<Sums>,
     /// Strain energy of hexahedra by mode.
     pub modes: Option<Sums>,
+    /// Energy of the hourglass modes of hexahedra.
+    pub hourglass: Option<Sums>,
     pub axial: Option<Sums>,
     pub bending: Option<Sums>,
     pub kinetic: Sums,
@@ -94,6 +98,7 @@ pub(super) struct Sources<'a> {
     pub element_limit: Buffer,
     pub beam_table: Buffer,
     pub hex_energy: Option<Buffer>,
+    pub hex_hourglass: Option<Buffer>,
     pub hex_virial: Option<Buffer>,
     pub beam_tension: Option<Buffer>,
     pub beam_work: Option<Buffer>,
@@ -261,7 +266,7 @@ pub(super) fn add(b: &mut Builder, s: &Sources) -> (Totals, Option<Buffer>) {
     }
     let mut stress = Vec::new();
     if let Some(virial) = s.hex_virial {
-        stress.push(c.taken(virial, Columns::blocks(s.hex_blocks, hex8::VIRIAL, 9), false));
+        stress.push(c.taken(virial, Columns::blocks(s.hex_blocks, VIRIAL, 9), false));
     }
     for (virial, count) in [(s.beam_virial, beams), (s.bend_virial, s.bends)] {
         stress.extend(virial.map(|virial| c.taken(virial, Columns::rows(count, 9), false)));
@@ -278,14 +283,15 @@ pub(super) fn add(b: &mut Builder, s: &Sources) -> (Totals, Option<Buffer>) {
         stress,
         contact,
         ties: s.ties.map(|(energy, count)| c.kept(energy, Columns::range(0..count))),
-        modes: s.hex_energy.map(|e| c.kept(e, Columns::blocks(s.hex_blocks, hex8::ENERGY, 4))),
+        modes: s.hex_energy.map(|e| c.kept(e, Columns::blocks(s.hex_blocks, ENERGY, 4))),
+        hourglass: s.hex_hourglass.map(|e| c.kept(e, Columns::blocks(s.hex_blocks, HOURGLASS, 1))),
         axial: s.beam_tension.map(|tension| c.axial(tension, s)),
         bending: s.bend_energy.map(|e| c.kept(e, Columns::range(0..s.bends))),
         kinetic: c.kinetic(s, false),
         kinetic_total: s.mesh.period.map(|_| c.kinetic(s, true)),
         added: [part(c, 0..first), part(c, first..nodes)],
         jacobian: jacobian.map(|(energy, used)| {
-            let jacobians = Columns { start: 4 * LANES, ..Columns::blocks(s.hex_blocks, hex8::ENERGY, 1) };
+            let jacobians = Columns { start: 4 * LANES, ..Columns::blocks(s.hex_blocks, ENERGY, 1) };
             c.largest(energy, jacobians, Some(used))
         }),
         stiffness: c.largest(s.element_limit, Columns::range(nodes..2 * nodes), None),

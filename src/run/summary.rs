@@ -51,7 +51,7 @@ impl Run<'_> {
             "worst_energy_balance": self.worst_balance,
             "worst_kinetic_over_internal_in_shear": self.worst_kinetic,
             "specimen": self.pulled.as_ref().map(Pulled::summary),
-            "energies_mj": e.columns().into_iter().map(|(name, value)| (name.to_owned(), json!(value))).collect::<serde_json::Map<_, _>>(),
+            "energies_mj": e.columns().map(|(name, value)| (name.to_owned(), json!(value))).collect::<serde_json::Map<_, _>>(),
             "state_hash": hash,
             "pictures": self.pictures,
             "frames": self.frames.iter().map(|(time, file)| json!({"time_s": time, "file": file})).collect::<Vec<_>>(),

@@ -15,6 +15,8 @@ pub struct Energies {
     pub compaction: f64,
     pub distortion: f64,
     pub shear: f64,
+    /// Of the modes that hexahedra with one integration point do not see; `None` with eight points.
+    pub hourglass: Option<f64>,
     /// Of threads.
     pub axial: f64,
     pub bending: f64,
@@ -41,7 +43,8 @@ pub struct Energies {
 impl Energies {
     /// Strain energy of yarns and threads.
     pub fn internal(&self) -> f64 {
-        self.elongation + self.compaction + self.distortion + self.shear + self.axial + self.bending
+        let solids = self.elongation + self.compaction + self.distortion + self.shear;
+        solids + self.hourglass.unwrap_or(0.0) + self.axial + self.bending
     }
 
     /// All work put in.
@@ -55,12 +58,14 @@ impl Energies {
     }
 
     /// Names and values, for a table.
-    pub fn columns(&self) -> [(&'static str, f64); 18] {
-        [
+    pub fn columns(&self) -> impl Iterator<Item = (&'static str, f64)> + use<> {
+        let modes = [
             ("elongation_mj", self.elongation),
             ("compaction_mj", self.compaction),
             ("distortion_mj", self.distortion),
             ("shear_mj", self.shear),
+        ];
+        let others = [
             ("axial_mj", self.axial),
             ("bending_mj", self.bending),
             ("contact_mj", self.contact),
@@ -75,7 +80,8 @@ impl Energies {
             ("prescribed_work_mj", self.prescribed),
             ("gravity_work_mj", self.gravity),
             ("added_inertia_work_mj", self.inertia),
-        ]
+        ];
+        modes.into_iter().chain(self.hourglass.map(|energy| ("hourglass_mj", energy))).chain(others)
     }
 }
 
@@ -168,6 +174,7 @@ impl Simulation {
             compaction: modes[1],
             distortion: modes[2],
             shear: modes[3],
+            hourglass: places.hourglass.map(|sums| sums.of(totals, 0)),
             axial: only(places.axial),
             bending: only(places.bending),
             kinetic,

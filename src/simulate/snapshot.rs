@@ -25,6 +25,7 @@ impl Recorded for Energies {
             compaction,
             distortion,
             shear,
+            hourglass,
             axial,
             bending,
             contact,
@@ -42,7 +43,7 @@ impl Recorded for Energies {
         } = self;
         let stored = [elongation, compaction, distortion, shear, axial, bending, contact, kinetic, kinetic_total];
         let flows = [friction, contact_damping, damping, thermal, radius, external, prescribed, gravity, inertia];
-        stored.into_iter().chain(flows).for_each(|x| x.record(record));
+        stored.into_iter().chain(flows).chain(hourglass).for_each(|x| x.record(record));
     }
 }
 

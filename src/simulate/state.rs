@@ -3,7 +3,7 @@
 use super::Simulation;
 use crate::case::steps::Precision;
 use crate::contact::{EMPTY, penalty};
-use crate::elements::hex8::LANES;
+use crate::elements::LANES;
 use crate::kernel::buffer::Buffer;
 use crate::kernel::position::{QUANTUM, quanta};
 use crate::mesh::frame::{Field, Frame};

@@ -88,6 +88,12 @@ pub fn with(mut value: Value, changes: &[(&str, Value)]) -> Value {
     value
 }
 
+/// The case with hexahedra of one integration point.
+pub fn reduced(mut case: Value) -> Value {
+    case["integration"]["hexahedra"] = json!("reduced");
+    case
+}
+
 pub fn neo_hookean(young: f64, poisson: f64) -> Value {
     json!({ "neo_hookean": { "young_mpa": young, "poisson": poisson } })
 }

@@ -1,0 +1,120 @@
+// What hexahedra share: one invocation works on one lane of a block. The element that includes this says how many numbers a
+// SHAPE has.
+
+#include "elements/mod"
+#include "kernel/row"
+#include "kernel/position"
+#include LAW
+
+// Numbers of a block in the buffers that are written.
+const SLOTS: u32 = 24u * LANES;
+const VIRIAL: u32 = 9u * LANES;
+const ENERGY: u32 = 5u * LANES;
+const BOUND: u32 = 8u * LANES;
+
+struct Params {
+    // Nodes in a plane of the position buffers.
+    nodes: u32,
+}
+
+@group(2) @binding(1) var<uniform> params: Params;
+
+@group(1) @binding(0) var<storage, read> headers: array<u32>;
+@group(1) @binding(1) var<storage, read> corners: array<u32>;
+@group(1) @binding(2) var<storage, read> quanta: array<i32>;
+@group(1) @binding(3) var<storage, read> remainder: array<f32>;
+@group(1) @binding(4) var<storage, read> shapes: array<f32>;
+@group(1) @binding(5) var<storage, read> frames: array<f32>;
+@group(1) @binding(6) var<storage, read> materials: array<f32>;
+@group(1) @binding(7) var<storage, read_write> out: array<f32>;
+#if PERIODIC
+@group(1) @binding(8) var<storage, read_write> out_virial: array<f32>;
+#endif
+
+// A hexahedron: where its numbers start in the tables.
+struct Hex {
+    corners: u32,
+    shape: u32,
+    frame: u32,
+    material: u32,
+}
+
+fn hex(block: u32, lane: u32) -> Hex {
+    let header = 4u * block;
+    return Hex(
+        8u * LANES * block + lane,
+        SHAPE * headers[header + 2u] + lane,
+        9u * headers[header + 1u],
+        PARAMETERS * headers[header],
+    );
+}
+
+fn frame(h: Hex) -> Tensor {
+    let q = h.frame;
+    return Tensor(
+        vec3<f32>(frames[q], frames[q + 1u], frames[q + 2u]),
+        vec3<f32>(frames[q + 3u], frames[q + 4u], frames[q + 5u]),
+        vec3<f32>(frames[q + 6u], frames[q + 7u], frames[q + 8u]),
+    );
+}
+
+fn material(h: Hex) -> array<f32, PARAMETERS> {
+    let p = h.material;
+    return array<f32, PARAMETERS>(
+        materials[p],
+        materials[p + 1u],
+        materials[p + 2u],
+        materials[p + 3u],
+        materials[p + 4u],
+        materials[p + 5u],
+        materials[p + 6u],
+        materials[p + 7u],
+    );
+}
+
+fn node_quanta(node: u32) -> vec3<i32> {
+    return vec3<i32>(quanta[node], quanta[node + params.nodes], quanta[node + 2u * params.nodes]);
+}
+
+fn node_remainder(node: u32) -> vec3<f32> {
+    return vec3<f32>(remainder[node], remainder[node + params.nodes], remainder[node + 2u * params.nodes]);
+}
+
+// Displacement of a corner (in mesh order) from a position.
+fn displacement(h: Hex, corner: u32, from_quanta: vec3<i32>, from_remainder: vec3<f32>) -> vec3<f32> {
+    let node = corners[h.corners + corner * LANES];
+    return vec3<f32>(node_quanta(node) - from_quanta) * QUANTUM + (node_remainder(node) - from_remainder);
+}
+
+// The macroscopic gradient in the fibre's frame, Qᵀ A Q.
+fn macroscopic(q: Tensor) -> Tensor {
+    let g = gradient();
+    return (q * Tensor(g[0], g[1], g[2])) * transpose(q);
+}
+
+#if force
+// Writes three components, a lane apart.
+fn store(at: u32, a: vec3<f32>) {
+    out[at] = a.x;
+    out[at + LANES] = a.y;
+    out[at + 2u * LANES] = a.z;
+}
+
+#if PERIODIC
+fn add_to_row(at: u32, a: vec3<f32>) {
+    out_virial[at] = out_virial[at] + a.x;
+    out_virial[at + LANES] = out_virial[at + LANES] + a.y;
+    out_virial[at + 2u * LANES] = out_virial[at + 2u * LANES] + a.z;
+}
+
+// Adds V P, in the fibre's frame, to the stress sum of a block.
+fn add_virial(block: u32, lane: u32, q: Tensor, stress: Tensor) {
+    // Q A Qᵀ
+    let turned = (transpose(q) * stress) * q;
+    let start = VIRIAL * block + lane;
+    add_to_row(start, turned[0]);
+    add_to_row(start + 3u * LANES, turned[1]);
+    add_to_row(start + 6u * LANES, turned[2]);
+}
+#endif
+#endif

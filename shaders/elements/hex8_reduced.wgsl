@@ -1,0 +1,205 @@
+// 8-node hexahedron with one integration point and hourglass control: one invocation works on one lane of a block.
+
+#include "elements/block"
+
+// Numbers of a shape, and where they start: B of each corner, the volume, Σ h X of each mode, k of each mode.
+const SHAPE: u32 = 41u * LANES;
+const VOLUME: u32 = 24u;
+const MOMENTS: u32 = 25u;
+const STIFFNESS: u32 = 37u;
+
+#if energy
+// Energies of the modes of a block.
+const HOURGLASS: u32 = LANES;
+
+@group(1) @binding(8) var<storage, read_write> out_hourglass: array<f32>;
+#endif
+
+// Deformation of a hexahedron.
+struct Deformation {
+    // Mean displacement gradient in the fibre's frame.
+    h: Tensor,
+    // k q by mode, along global axes.
+    forces: array<vec3<f32>, 4>,
+    // ½ Σ k |q|².
+    energy: f32,
+}
+
+// A number of the shape.
+fn entry(h: Hex, place: u32) -> f32 {
+    return shapes[h.shape + place * LANES];
+}
+
+fn volume(h: Hex) -> f32 {
+    return entry(h, VOLUME);
+}
+
+// B of a binary corner.
+fn slope(h: Hex, corner: u32) -> vec3<f32> {
+    return vec3<f32>(entry(h, 3u * corner), entry(h, 3u * corner + 1u), entry(h, 3u * corner + 2u));
+}
+
+// Σ h X of a mode.
+fn moment(h: Hex, mode: u32) -> vec3<f32> {
+    let first = MOMENTS + 3u * mode;
+    return vec3<f32>(entry(h, first), entry(h, first + 1u), entry(h, first + 2u));
+}
+
+// Adds u ⊗ B.
+fn add_product_of(u: vec3<f32>, b: vec3<f32>, to: Tensor) -> Tensor {
+    return Tensor(fma(u.xxx, b, to[0]), fma(u.yyy, b, to[1]), fma(u.zzz, b, to[2]));
+}
+
+// k q of a mode, from Σ h u.
+fn held(h: Hex, mode: u32, sum: vec3<f32>, mixed: Tensor, energy: ptr<function, f32>) -> vec3<f32> {
+    let q = sum - moment(h, mode) * mixed;
+    let force = entry(h, STIFFNESS + mode) * q;
+    *energy = *energy + dot(force, q);
+    return force;
+}
+
+fn deformation(h: Hex, q: Tensor) -> Deformation {
+    let node = corners[h.corners];
+    let at = node_quanta(node);
+    let rest = node_remainder(node);
+    // binary order; the first corner does not move against itself
+    let u1 = displacement(h, 1u, at, rest);
+    let u2 = displacement(h, 3u, at, rest);
+    let u3 = displacement(h, 2u, at, rest);
+    let u4 = displacement(h, 4u, at, rest);
+    let u5 = displacement(h, 5u, at, rest);
+    let u6 = displacement(h, 7u, at, rest);
+    let u7 = displacement(h, 6u, at, rest);
+    // components along global axes, derivatives along those of the fibre
+    var mixed = Tensor();
+    mixed = add_product_of(u1, slope(h, 1u), mixed);
+    mixed = add_product_of(u2, slope(h, 2u), mixed);
+    mixed = add_product_of(u3, slope(h, 3u), mixed);
+    mixed = add_product_of(u4, slope(h, 4u), mixed);
+    mixed = add_product_of(u5, slope(h, 5u), mixed);
+    mixed = add_product_of(u6, slope(h, 6u), mixed);
+    mixed = add_product_of(u7, slope(h, 7u), mixed);
+    // Σ h u of the modes ηζ, ξζ, ξη and ξηζ
+    let d1 = u3 - u2;
+    let d2 = u5 - u4;
+    let d3 = u7 - u6;
+    let low = d1 - u1;
+    let high = d3 - d2;
+    var energy = 0.0;
+    let forces = array<vec3<f32>, 4>(
+        held(h, 0u, (u1 - (u2 + u3)) + ((u6 + u7) - (u4 + u5)), mixed, &energy),
+        held(h, 1u, (d2 + d3) - (u1 + d1), mixed, &energy),
+        held(h, 2u, low + high, mixed, &energy),
+        held(h, 3u, high - low, mixed, &energy),
+    );
+    return Deformation(macroscopic(q) + mixed * transpose(q), forces, 0.5 * energy);
+}
+
+#if force
+// Writes the force on a corner (in mesh order) from its B and Σ h k q.
+fn store_force(h: Hex, at: u32, corner: u32, binary: u32, conjugate: Tensor, sum: vec3<f32>) {
+    store(at + 3u * corner * LANES, -(sum + slope(h, binary) * conjugate));
+}
+
+fn force(number: u32) {
+    let block = number / LANES;
+    let lane = number % LANES;
+    let h = hex(block, lane);
+    let q = frame(h);
+    let state = deformation(h, q);
+    let weighted = stress(material(h), state.h) * volume(h);
+    // what is conjugate to the gradient: stress, less what the modes take from linear displacements
+    var conjugate = weighted * q;
+    conjugate = add_product_of(-state.forces[0], moment(h, 0u), conjugate);
+    conjugate = add_product_of(-state.forces[1], moment(h, 1u), conjugate);
+    conjugate = add_product_of(-state.forces[2], moment(h, 2u), conjugate);
+    conjugate = add_product_of(-state.forces[3], moment(h, 3u), conjugate);
+    let g0 = state.forces[0];
+    let g1 = state.forces[1];
+    let plus = state.forces[2] + state.forces[3];
+    let minus = state.forces[3] - state.forces[2];
+    let along0 = minus - g1;
+    let along1 = -(minus + g1);
+    let along2 = g1 - plus;
+    let along3 = g1 + plus;
+    let at = SLOTS * block + lane;
+    store_force(h, at, 0u, 0u, conjugate, g0 - along0);
+    store_force(h, at, 1u, 1u, conjugate, g0 + along0);
+    store_force(h, at, 2u, 3u, conjugate, along1 - g0);
+    store_force(h, at, 3u, 2u, conjugate, -(g0 + along1));
+    store_force(h, at, 4u, 4u, conjugate, -(g0 + along2));
+    store_force(h, at, 5u, 5u, conjugate, along2 - g0);
+    store_force(h, at, 6u, 7u, conjugate, g0 + along3);
+    store_force(h, at, 7u, 6u, conjugate, g0 - along3);
+#if PERIODIC
+    add_virial(block, lane, q, weighted);
+#endif
+}
+#endif
+
+#if energy
+fn energy(number: u32) {
+    let block = number / LANES;
+    let lane = number % LANES;
+    let h = hex(block, lane);
+    let state = deformation(h, frame(h));
+    let modes = energies(material(h), state.h) * volume(h);
+    let at = ENERGY * block + lane;
+    out[at] = modes.x;
+    out[at + LANES] = modes.y;
+    out[at + 2u * LANES] = modes.z;
+    out[at + 3u * LANES] = modes.w;
+    out[at + 4u * LANES] = jacobian(state.h);
+    out_hourglass[HOURGLASS * block + lane] = state.energy;
+}
+#endif
+
+#if bound
+// Sign of a mode at a binary corner.
+fn sign_of(mode: u32, corner: u32) -> f32 {
+    let s = vec3<f32>((vec3<u32>(corner) >> vec3<u32>(0u, 1u, 2u)) & vec3<u32>(1u)) * 2.0 - 1.0;
+    return vec4<f32>(s.y * s.z, s.x * s.z, s.x * s.y, s.x * s.y * s.z)[mode];
+}
+
+fn bound(number: u32) {
+    let block = number / LANES;
+    let lane = number % LANES;
+    let h = hex(block, lane);
+    let state = deformation(h, frame(h));
+    // modulus × V |B_a| Σ|B|, across the fibre
+    var rows = array<f32, 8>();
+    var sizes = array<f32, 8>();
+    var total = 0.0;
+    for (var a = 0u; a < 8u; a++) {
+        let b = slope(h, a);
+        sizes[a] = sqrt(fma(b.z, b.z, b.y * b.y));
+        total = total + sizes[a];
+    }
+    let modulus = stiffness(material(h), state.h) * volume(h) * total;
+    for (var a = 0u; a < 8u; a++) {
+        rows[a] = modulus * sizes[a];
+    }
+    // k |γ_a| Σ|γ|
+    for (var mode = 0u; mode < 4u; mode++) {
+        let from = moment(h, mode);
+        total = 0.0;
+        for (var a = 0u; a < 8u; a++) {
+            sizes[a] = abs(sign_of(mode, a) - dot(from, slope(h, a)));
+            total = total + sizes[a];
+        }
+        let k = entry(h, STIFFNESS + mode) * total;
+        for (var a = 0u; a < 8u; a++) {
+            rows[a] = fma(k, sizes[a], rows[a]);
+        }
+    }
+    let at = BOUND * block + lane;
+    out[at] = rows[0];
+    out[at + LANES] = rows[1];
+    out[at + 2u * LANES] = rows[3];
+    out[at + 3u * LANES] = rows[2];
+    out[at + 4u * LANES] = rows[4];
+    out[at + 5u * LANES] = rows[5];
+    out[at + 6u * LANES] = rows[7];
+    out[at + 7u * LANES] = rows[6];
+}
+#endif

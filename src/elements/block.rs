@@ -1,0 +1,210 @@
+//! What hexahedra share: blocks of sixteen lanes, displacements of their corners, the frame of the fibre, what is written.
+//!
+//! Hexahedra are stored in blocks of sixteen, lane by lane. Straight extruded yarns share few reference shapes, so a block
+//! names a *shape* (what the element keeps of the reference of its sixteen lanes) instead of keeping one. Displacements
+//! enter as differences to the first corner. Corner order in registers is binary, `i + 2 j + 4 k` for (ξ, η, ζ).
+
+use super::LANES;
+use crate::kernel::lane::{Lane, Real};
+use crate::kernel::position::difference;
+use crate::kernel::stage::Io;
+use crate::materials::{PARAMETERS, Tensor};
+use bytemuck::{Pod, Zeroable};
+use std::marker::PhantomData;
+
+/// Corner slots of a block: 8 corners × 3 components × lanes.
+pub const SLOTS: usize = 24 * LANES;
+/// Numbers of a block's stress sum Σ w P, N·mm.
+pub const VIRIAL: usize = 9 * LANES;
+/// Numbers of a block's energies by mode (4), mJ, and smallest Jacobian (1).
+pub const ENERGY: usize = 5 * LANES;
+/// Numbers of a block's corner stiffness bounds, N/mm.
+pub const BOUND: usize = 8 * LANES;
+
+/// Binary corner index of each corner in mesh order.
+pub const BINARY: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
+
+/// What the kernels need to know of a block.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable, PartialEq, Eq)]
+pub struct Header {
+    /// Row of the material table.
+    pub material: u32,
+    /// Row of the table of fibre frames.
+    pub frame: u32,
+    /// Shape.
+    pub shape: u32,
+    /// 1 if every corner's nodes are consecutive over the lanes.
+    pub contiguous: u32,
+}
+
+/// Constants of the stages.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Params {
+    /// Nodes in a plane of the position buffers.
+    pub nodes: u32,
+}
+
+/// Reads, in binding order.
+pub const HEADERS: usize = 0;
+pub const CORNERS: usize = 1;
+pub const QUANTA: usize = 2;
+pub const REMAINDER: usize = 3;
+pub const SHAPES: usize = 4;
+pub const FRAMES: usize = 5;
+pub const MATERIALS: usize = 6;
+/// The first write.
+pub const OUT: usize = 7;
+/// The stress sum, for periodic scenes.
+const OUT_VIRIAL: usize = 8;
+
+/// A block and one register of its lanes.
+pub struct Lanes<'a, L: Lane> {
+    header: Header,
+    corners: &'a [u32],
+    shape: &'a [L::Scalar],
+    lane: usize,
+    life: PhantomData<L>,
+}
+
+impl<'a, L: Lane> Lanes<'a, L> {
+    /// The lanes of a block from `lane` on; a shape has `size` numbers.
+    #[inline(always)]
+    pub fn new(io: &'a Io<L::Scalar>, size: usize, block: usize, lane: usize) -> Self {
+        let header: Header = bytemuck::pod_read_unaligned(bytemuck::cast_slice(&io.uints(HEADERS)[4 * block..][..4]));
+        Self {
+            header,
+            corners: &io.uints(CORNERS)[8 * LANES * block..][..8 * LANES],
+            shape: &io.scalars(SHAPES)[size * header.shape as usize..][..size],
+            lane,
+            life: PhantomData,
+        }
+    }
+
+    /// A number of the shape.
+    #[inline(always)]
+    pub fn shape(&self, entry: usize) -> L {
+        L::load(&self.shape[entry * LANES + self.lane..])
+    }
+
+    /// The axes of the fibre's frame, one a column.
+    #[inline(always)]
+    pub fn frame(&self, io: &Io<L::Scalar>) -> Tensor<L> {
+        splat_tensor(&self.scalar_frame(io))
+    }
+
+    #[inline(always)]
+    fn scalar_frame(&self, io: &Io<L::Scalar>) -> Tensor<L::Scalar> {
+        let q = &io.scalars(FRAMES)[9 * self.header.frame as usize..][..9];
+        [[q[0], q[1], q[2]], [q[3], q[4], q[5]], [q[6], q[7], q[8]]]
+    }
+
+    /// The macroscopic gradient F̄ − I in the fibre's frame.
+    #[inline(always)]
+    pub fn macroscopic(&self, io: &Io<L::Scalar>) -> Tensor<L> {
+        splat_tensor(&turn(&self.scalar_frame(io), &io.row.gradient, false))
+    }
+
+    #[inline(always)]
+    pub fn material(&self, io: &Io<L::Scalar>) -> [L; PARAMETERS] {
+        let row = &io.scalars(MATERIALS)[PARAMETERS * self.header.material as usize..][..PARAMETERS];
+        let mut parameters = [L::splat(row[0]); PARAMETERS];
+        for (parameter, value) in parameters.iter_mut().zip(row) {
+            *parameter = L::splat(*value);
+        }
+        parameters
+    }
+
+    /// Displacements of the corners relative to the first, by component and binary corner.
+    #[inline(always)]
+    pub fn displacements(&self, io: &Io<L::Scalar>, nodes: usize) -> [[L; 8]; 3] {
+        let (quanta, remainder) = (io.ints(QUANTA), io.scalars(REMAINDER));
+        let zero = L::Scalar::from_f64(0.0);
+        let mut global = [[L::splat(zero); 8]; 3];
+        for (component, row) in global.iter_mut().enumerate() {
+            let (quanta, remainder) = (&quanta[component * nodes..][..nodes], &remainder[component * nodes..][..nodes]);
+            let mut first = ([0i32; LANES], [zero; LANES]);
+            let mut buffer = [zero; LANES];
+            for (corner, &binary) in BINARY.iter().enumerate() {
+                let ids = &self.corners[corner * LANES + self.lane..][..L::WIDTH];
+                if self.header.contiguous == 1 {
+                    let start = ids[0] as usize;
+                    let (q, r) = (&quanta[start..][..L::WIDTH], &remainder[start..][..L::WIDTH]);
+                    if corner == 0 {
+                        first.0[..L::WIDTH].copy_from_slice(q);
+                        first.1[..L::WIDTH].copy_from_slice(r);
+                        continue;
+                    }
+                    for l in 0..L::WIDTH {
+                        buffer[l] = difference(q[l], r[l], first.0[l], first.1[l]);
+                    }
+                } else {
+                    for (l, &id) in ids.iter().enumerate() {
+                        let (q, r) = (quanta[id as usize], remainder[id as usize]);
+                        if corner == 0 {
+                            (first.0[l], first.1[l]) = (q, r);
+                        }
+                        buffer[l] = difference(q, r, first.0[l], first.1[l]);
+                    }
+                }
+                row[binary] = L::load(&buffer);
+            }
+        }
+        global
+    }
+
+    /// Writes a component of the force on a corner (in mesh order).
+    #[inline(always)]
+    pub fn store_force(&self, slots: &mut [L::Scalar], corner: usize, component: usize, force: L) {
+        force.store(&mut slots[(3 * corner + component) * LANES + self.lane..]);
+    }
+
+    /// Adds V P, in the fibre's frame, to the stress sum of a block.
+    #[inline(always)]
+    pub fn add_virial(&self, io: &Io<L::Scalar>, block: usize, q: &Tensor<L>, stress: &Tensor<L>) {
+        let sum = turn(q, stress, true);
+        let mut virials = io.own::<L::Scalar>(OUT_VIRIAL);
+        let out = virials.item(0, block);
+        for i in 0..3 {
+            for j in 0..3 {
+                let place = &mut out[(3 * i + j) * LANES + self.lane..];
+                (L::load(place) + sum[i][j]).store(place);
+            }
+        }
+    }
+}
+
+/// The same tensor in every lane.
+#[inline(always)]
+fn splat_tensor<L: Lane>(a: &Tensor<L::Scalar>) -> Tensor<L> {
+    let mut splat = [[L::splat(a[0][0]); 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            splat[i][j] = L::splat(a[i][j]);
+        }
+    }
+    splat
+}
+
+/// Qᵀ A Q, or Q A Qᵀ if `out`.
+#[inline(always)]
+fn turn<L: Lane>(q: &Tensor<L>, a: &Tensor<L>, out: bool) -> Tensor<L> {
+    let zero = L::new(0.0);
+    let (mut half, mut full) = ([[zero; 3]; 3], [[zero; 3]; 3]);
+    for i in 0..3 {
+        for j in 0..3 {
+            for k in 0..3 {
+                half[i][j] = a[i][k].fma(if out { q[j][k] } else { q[k][j] }, half[i][j]);
+            }
+        }
+    }
+    for i in 0..3 {
+        for j in 0..3 {
+            for k in 0..3 {
+                full[i][j] = half[k][j].fma(if out { q[i][k] } else { q[k][i] }, full[i][j]);
+            }
+        }
+    }
+    full
+}

@@ -1,0 +1,263 @@
+//! 8-node hexahedron with one integration point and hourglass control, total Lagrangian.
+//!
+//! The displacement gradient is the mean over the element (Flanagan and Belytschko 1981), taken in the reference:
+//!
+//! ```text
+//! H = Σ_a u_a ⊗ B_a,   B_a = (1/V) ∫ ∇N_a dV       so that Σ_a X_a ⊗ B_a = I on any shape
+//! q_α = Σ_a γ_αa u_a,   γ_αa = h_αa − B_a · Σ_b h_αb X_b,   h = ηζ, ξζ, ξη, ξηζ at the corners
+//! W = V w(H) + ½ Σ_α k_α |q_α|²,   f_a = −∂W/∂u_a
+//! ```
+//!
+//! A uniform stress gives the forces of the fully integrated element: the patch test holds on any shape. H does not see the
+//! twelve modes u = q h_α; only their stiffness k_α, of the shear modulus of the law, resists them. No γ_α sees a linear
+//! displacement, so that k_α changes no uniform deformation, a macroscopic gradient adds to H alone, and a rotation turns q
+//! and leaves W. The modes bend fibres within an element: there the fibres' own stiffness has no part.
+
+use super::LANES;
+use super::block::{BINARY, Lanes, OUT, Params};
+use crate::kernel::lane::Lane;
+use crate::kernel::shader::{Shader, Share};
+use crate::kernel::stage::{Io, Kernel};
+use crate::materials::{Material, Tensor, jacobian};
+use std::marker::PhantomData;
+use std::ops::Range;
+
+/// Numbers of a shape: B of each corner (3), the volume, Σ h_α X of each mode (3), k_α of each mode; times lanes.
+pub const SHAPE: usize = (STIFFNESS + 4) * LANES;
+/// Where they start.
+const VOLUME: usize = 24;
+const MOMENTS: usize = 25;
+const STIFFNESS: usize = 37;
+
+/// The modes ηζ, ξζ, ξη and ξηζ at the binary corners.
+pub const MODES: [[f64; 8]; 4] = [
+    [1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0],
+    [1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0],
+    [1.0, -1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0],
+    [-1.0, 1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0],
+];
+
+/// Energies of the modes of a block, mJ.
+pub const HOURGLASS: usize = LANES;
+/// They are written after energies by mode.
+const OUT_HOURGLASS: usize = OUT + 1;
+
+/// Nodal forces of hexahedra; with `PERIODIC`, also the sum of stress for the homogenised first Piola stress.
+pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
+/// Energies by mode and Jacobian; energy of the hourglass modes.
+pub struct Energy<M>(PhantomData<M>);
+/// Row sums of the stiffness that fibre lines do not cover.
+pub struct Bound<M>(PhantomData<M>);
+
+/// B of a binary corner.
+#[inline(always)]
+fn slope<L: Lane>(lanes: &Lanes<L>, corner: usize) -> [L; 3] {
+    [lanes.shape(3 * corner), lanes.shape(3 * corner + 1), lanes.shape(3 * corner + 2)]
+}
+
+/// Σ h_α X of a mode.
+#[inline(always)]
+fn moment<L: Lane>(lanes: &Lanes<L>, mode: usize) -> [L; 3] {
+    let first = MOMENTS + 3 * mode;
+    [lanes.shape(first), lanes.shape(first + 1), lanes.shape(first + 2)]
+}
+
+#[inline(always)]
+fn dot<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
+    a[2].fma(b[2], a[1].fma(b[1], a[0] * b[0]))
+}
+
+/// Σ_a h_αa u_a of each mode.
+#[inline(always)]
+fn modes<L: Lane>(u: &[L; 8]) -> [L; 4] {
+    let sums = [u[0] + u[1], u[2] + u[3], u[4] + u[5], u[6] + u[7]];
+    let d = [u[1] - u[0], u[3] - u[2], u[5] - u[4], u[7] - u[6]];
+    let (low, high) = (d[1] - d[0], d[3] - d[2]);
+    [(sums[0] - sums[1]) + (sums[3] - sums[2]), (d[2] + d[3]) - (d[0] + d[1]), low + high, high - low]
+}
+
+/// The transpose of [`modes`]: Σ_α h_αa g_α of each corner.
+#[inline(always)]
+fn spread<L: Lane>(g: [L; 4]) -> [L; 8] {
+    let (plus, minus) = (g[2] + g[3], g[3] - g[2]);
+    let along = [minus - g[1], -(minus + g[1]), g[1] - plus, g[1] + plus];
+    [
+        g[0] - along[0],
+        g[0] + along[0],
+        -(g[0] + along[1]),
+        along[1] - g[0],
+        -(g[0] + along[2]),
+        along[2] - g[0],
+        g[0] - along[3],
+        g[0] + along[3],
+    ]
+}
+
+/// Deformation of one register of hexahedra.
+struct Deformation<L> {
+    /// Mean displacement gradient in the fibre's frame.
+    h: Tensor<L>,
+    /// k q by mode and component, along global axes.
+    forces: [[L; 3]; 4],
+    /// ½ Σ k |q|².
+    energy: L,
+}
+
+#[inline(always)]
+fn deformation<L: Lane>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize) -> Deformation<L> {
+    let zero = L::new(0.0);
+    let u = lanes.displacements(io, nodes);
+    // components along global axes, derivatives along those of the fibre; the first corner does not move against itself
+    let mut mixed = [[zero; 3]; 3];
+    for corner in 1..8 {
+        let b = slope(lanes, corner);
+        for i in 0..3 {
+            for j in 0..3 {
+                mixed[i][j] = u[i][corner].fma(b[j], mixed[i][j]);
+            }
+        }
+    }
+    let seen = [modes(&u[0]), modes(&u[1]), modes(&u[2])];
+    let mut forces = [[zero; 3]; 4];
+    let mut energy = zero;
+    for mode in 0..4 {
+        let (moment, stiffness) = (moment(lanes, mode), lanes.shape(STIFFNESS + mode));
+        for i in 0..3 {
+            let q = seen[i][mode] - dot(&mixed[i], &moment);
+            forces[mode][i] = stiffness * q;
+            energy = forces[mode][i].fma(q, energy);
+        }
+    }
+    let q = lanes.frame(io);
+    let mut h = lanes.macroscopic(io);
+    for i in 0..3 {
+        for j in 0..3 {
+            for k in 0..3 {
+                h[i][j] = q[k][i].fma(mixed[k][j], h[i][j]);
+            }
+        }
+    }
+    Deformation { h, forces, energy: L::new(0.5) * energy }
+}
+
+/// The twin of a kernel for a law, one lane an invocation.
+const fn shader<M: Material>(kernel: &'static str) -> Shader {
+    Shader { law: Some(M::SHADER), share: Share::Invocations(LANES), ..Shader::new("elements/hex8_reduced", kernel) }
+}
+
+impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
+    const SHADER: Shader = Shader { defines: if PERIODIC { &["PERIODIC"] } else { &[] }, ..shader::<M>("force") };
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let Params { nodes } = io.params();
+        let mut slots = io.own::<L::Scalar>(OUT);
+        for item in items {
+            for lane in (0..LANES).step_by(L::WIDTH) {
+                let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
+                let state = deformation(io, &lanes, nodes as usize);
+                let volume = lanes.shape(VOLUME);
+                let mut stress = M::stress(&lanes.material(io), &state.h);
+                for p in stress.as_flattened_mut() {
+                    *p = *p * volume;
+                }
+                let q = lanes.frame(io);
+                let out = slots.item(0, item);
+                for i in 0..3 {
+                    // what is conjugate to the gradient: stress, less what the modes take from linear displacements
+                    let mut conjugate = [L::new(0.0); 3];
+                    for j in 0..3 {
+                        for k in 0..3 {
+                            conjugate[j] = q[i][k].fma(stress[k][j], conjugate[j]);
+                        }
+                    }
+                    let mut held = [L::new(0.0); 4];
+                    for mode in 0..4 {
+                        held[mode] = state.forces[mode][i];
+                        let moment = moment(&lanes, mode);
+                        for j in 0..3 {
+                            conjugate[j] = conjugate[j] - held[mode] * moment[j];
+                        }
+                    }
+                    let held = spread(held);
+                    for (corner, &binary) in BINARY.iter().enumerate() {
+                        let f = -(held[binary] + dot(&conjugate, &slope(&lanes, binary)));
+                        lanes.store_force(out, corner, i, f);
+                    }
+                }
+                if PERIODIC {
+                    lanes.add_virial(io, item, &q, &stress);
+                }
+            }
+        }
+    }
+}
+
+impl<M: Material> Kernel for Energy<M> {
+    const SHADER: Shader = shader::<M>("energy");
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let Params { nodes } = io.params();
+        let mut out = io.own::<L::Scalar>(OUT);
+        let mut hourglass = io.own::<L::Scalar>(OUT_HOURGLASS);
+        for item in items {
+            for lane in (0..LANES).step_by(L::WIDTH) {
+                let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
+                let state = deformation(io, &lanes, nodes as usize);
+                let out = out.item(0, item);
+                for (mode, w) in M::energy(&lanes.material(io), &state.h).into_iter().enumerate() {
+                    (w * lanes.shape(VOLUME)).store(&mut out[mode * LANES + lane..]);
+                }
+                jacobian(&state.h).store(&mut out[4 * LANES + lane..]);
+                state.energy.store(&mut hourglass.item(0, item)[lane..]);
+            }
+        }
+    }
+}
+
+impl<M: Material> Kernel for Bound<M> {
+    const SHADER: Shader = shader::<M>("bound");
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let Params { nodes } = io.params();
+        let mut out = io.own::<L::Scalar>(OUT);
+        for item in items {
+            for lane in (0..LANES).step_by(L::WIDTH) {
+                let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
+                let h = deformation(io, &lanes, nodes as usize).h;
+                let zero = L::new(0.0);
+                // modulus × V |B_a| Σ|B|, across the fibre
+                let (mut sizes, mut total) = ([zero; 8], zero);
+                for (corner, size) in sizes.iter_mut().enumerate() {
+                    let b = slope(&lanes, corner);
+                    *size = b[2].fma(b[2], b[1] * b[1]).sqrt();
+                    total = total + *size;
+                }
+                let k = M::stiffness(&lanes.material(io), &h) * lanes.shape(VOLUME) * total;
+                let mut rows = [zero; 8];
+                for (row, size) in rows.iter_mut().zip(sizes) {
+                    *row = k * size;
+                }
+                // k |γ_a| Σ|γ|
+                for mode in 0..4 {
+                    let moment = moment(&lanes, mode);
+                    let (mut sizes, mut total) = ([zero; 8], zero);
+                    for (corner, size) in sizes.iter_mut().enumerate() {
+                        *size = (L::new(MODES[mode][corner]) - dot(&moment, &slope(&lanes, corner))).abs();
+                        total = total + *size;
+                    }
+                    let k = lanes.shape(STIFFNESS + mode) * total;
+                    for (row, size) in rows.iter_mut().zip(sizes) {
+                        *row = k.fma(size, *row);
+                    }
+                }
+                let out = out.item(0, item);
+                for (corner, &binary) in BINARY.iter().enumerate() {
+                    rows[binary].store(&mut out[corner * LANES + lane..]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! The buffers and stages of hexahedra, of the element and of the laws that the scene has.
+
+use super::solids::Solids;
+use super::{Builder, beside, own};
+use crate::elements::block::{BOUND, ENERGY, Params, SLOTS, VIRIAL};
+use crate::elements::{hex8, hex8_reduced};
+use crate::kernel::buffer::Buffer;
+use crate::kernel::stage::{Access, Kernel, Stage};
+use crate::materials::charmetant::Charmetant;
+use crate::materials::neo_hookean::NeoHookean;
+use crate::materials::{Law, Material};
+use std::ops::Range;
+
+/// What hexahedra write.
+pub(super) struct HexBuffers {
+    pub force: Buffer,
+    pub bound: Buffer,
+    pub energy: Option<Buffer>,
+    /// Energy of hourglass modes, of reduced integration.
+    pub hourglass: Option<Buffer>,
+    /// Stress sums of periodic scenes.
+    pub virial: Option<Buffer>,
+}
+
+/// Blocks of one law, and what their stages read.
+struct Blocks<'a> {
+    range: Range<usize>,
+    reads: &'a [Buffer],
+    params: Params,
+}
+
+impl HexBuffers {
+    /// Adds tables, results and stages; `position` are quanta and remainder of displacements.
+    pub(super) fn add(b: &mut Builder, solids: &Solids, position: [Buffer; 2], periodic: bool, reduced: bool) -> Self {
+        let hexes = solids.headers.len();
+        let materials = b.table("materials", solids.materials.clone());
+        let frames = b.table("fibre frames", solids.frames.clone());
+        let shapes = b.table("shapes", solids.shapes.clone());
+        let headers = b.indices("hex blocks", bytemuck::cast_slice(&solids.headers).to_vec());
+        let corners = b.indices("hex corners", solids.corners.clone());
+        let buffers = Self {
+            force: b.scratch("hex corner forces", SLOTS * hexes),
+            bound: b.scratch("hex stiffness bounds", BOUND * hexes),
+            energy: (hexes > 0).then(|| b.scratch("hex energies", ENERGY * hexes)),
+            hourglass: (hexes > 0 && reduced).then(|| b.scratch("hourglass energies", hex8_reduced::HOURGLASS * hexes)),
+            virial: (hexes > 0 && periodic).then(|| b.scratch("hex stress sums", VIRIAL * hexes)),
+        };
+        let [quanta, remainder] = position;
+        let reads = &[headers, corners, quanta, remainder, shapes, frames, materials];
+        let params = Params { nodes: (b.plan.buffers[remainder.0].len / 3) as u32 };
+        for (law, range) in &solids.laws {
+            let blocks = Blocks { range: range.clone(), reads, params };
+            match law {
+                Law::Charmetant => buffers.stages::<Charmetant>(b, &blocks),
+                Law::NeoHookean => buffers.stages::<NeoHookean>(b, &blocks),
+            }
+        }
+        buffers
+    }
+
+    fn stages<M: Material>(&self, b: &mut Builder, blocks: &Blocks) {
+        let force = (self.force, own(1, SLOTS));
+        let forces: Vec<_> = [force].into_iter().chain(self.virial.map(|v| (v, own(1, VIRIAL)))).collect();
+        let energies: Vec<_> = self.energy.map(|e| (e, own(1, ENERGY))).into_iter().collect();
+        let bounds = [(self.bound, own(1, BOUND))];
+        let [step, energy, bound] = match (self.hourglass, self.virial) {
+            (Some(hourglass), virial) => {
+                let energies = [&energies[..], &[(hourglass, own(1, hex8_reduced::HOURGLASS))]].concat();
+                let step = match virial {
+                    Some(_) => blocks.stage::<hex8_reduced::Force<M, true>>("hex8 reduced", &forces),
+                    None => blocks.stage::<hex8_reduced::Force<M, false>>("hex8 reduced", &forces),
+                };
+                let energy = blocks.stage::<hex8_reduced::Energy<M>>("hex8 reduced energy", &energies);
+                [step, energy, blocks.stage::<hex8_reduced::Bound<M>>("hex8 reduced bound", &bounds)]
+            }
+            (None, virial) => {
+                let step = match virial {
+                    Some(_) => blocks.stage::<hex8::Force<M, true>>("hex8", &forces),
+                    None => blocks.stage::<hex8::Force<M, false>>("hex8", &forces),
+                };
+                let energy = blocks.stage::<hex8::Energy<M>>("hex8 energy", &energies);
+                [step, energy, blocks.stage::<hex8::Bound<M>>("hex8 bound", &bounds)]
+            }
+        };
+        b.plan.step.push(step);
+        b.plan.diagnose.extend([energy, bound]);
+    }
+}
+
+impl Blocks<'_> {
+    fn stage<K: Kernel>(&self, name: &'static str, writes: &[(Buffer, Access)]) -> Stage {
+        /// Blocks in a chunk.
+        const GRAIN: usize = 4;
+        let stage = beside::<K>(name, self.range.len(), GRAIN, self.reads, writes, self.params);
+        Stage { first: self.range.start, ..stage }
+    }
+}
