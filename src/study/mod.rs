@@ -1,8 +1,9 @@
 //! Many runs at once: tables over a folder of scenes, and how results differ.
 //!
 //! [`difference`] holds the mathematics of comparing curves, [`results`] reads them from the folder of a run, and
-//! [`compare`] says how two folders differ.
+//! [`compare`] says how two folders differ. [`accuracy`] runs a case many times, to measure what accuracy costs.
 
+pub mod accuracy;
 pub mod compare;
 pub mod difference;
 pub mod results;
