@@ -123,15 +123,18 @@ fn report(cell: &mut Simulation, bare: f64) {
         .collect();
     let total: f64 = spent.iter().map(|(_, t)| t).sum();
     println!("\n{} hexes, {} beams; {}", cell.mesh.hexes(), cell.mesh.beams(), cell.backend().describe());
-    println!("stage            us/step   share   (mean of {steps} steps, {} searches)", cell.searches() - searches);
+    println!(
+        "stage                     us/step   share   (mean of {steps} steps, {} searches)",
+        cell.searches() - searches
+    );
     for (name, t) in &spent {
-        println!("{name:<15} {:>8.1} {:>6.1} %", 1e6 * t, 100.0 * t / total);
+        println!("{name:<24} {:>8.1} {:>6.1} %", 1e6 * t, 100.0 * t / total);
     }
-    println!("{:<15} {:>8.1}   of {:.1} us wall", "all stages", 1e6 * total, 1e6 * wall);
+    println!("{:<24} {:>8.1}   of {:.1} us wall", "all stages", 1e6 * total, 1e6 * wall);
     let of = |chosen: &dyn Fn(&str) -> bool| spent.iter().filter(|(n, _)| chosen(n)).map(|(_, t)| t).sum::<f64>();
     let searching: Vec<&str> = cell.model.plan.search.iter().map(|s| s.name).collect();
     let search = of(&|n| searching.contains(&n));
-    let forces = of(&|n| n.contains("contact"));
+    let forces = of(&|n| n.ends_with(" contact"));
     println!(
         "contact share: {:.1} % of the step ({:.1} % forces, {:.1} % search)",
         100.0 * (search + forces) / total,

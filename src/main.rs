@@ -9,6 +9,7 @@ use tricot::case::{schema, steps};
 use tricot::error::{Error, Result};
 use tricot::output::directory;
 use tricot::run;
+use tricot::study::accuracy::{self, accuracy};
 use tricot::study::compare::compare;
 use tricot::study::effects::{self, effects};
 use tricot::study::stability::stability;
@@ -34,6 +35,7 @@ Examples:
   tricot picture results/cell
   tricot report results/cell
   tricot compare results/cell results/other_way
+  tricot study accuracy cases/unit_cell_shear.json
   tricot study stability cases/hard
   tricot study effects cases/unit_cell_shear.json --only friction --set steps.2.shear.angle_deg=10
   tricot schema > case.schema.json
@@ -154,6 +156,26 @@ enum Command {
 
 #[derive(Subcommand)]
 enum StudyCommand {
+    /// Measure what accuracy costs in time: turn each numerical knob of a case, and compare with a much finer run.
+    Accuracy {
+        #[command(flatten)]
+        case: CaseArguments,
+        /// Folder of the study [default: results/<name of the case>-accuracy]
+        #[arg(short, long, value_name = "DIR")]
+        output: Option<PathBuf>,
+        /// Only points with one of these words in their name, e.g. mesh,beams,f64
+        #[arg(long, value_name = "WORDS", value_delimiter = ',')]
+        points: Vec<String>,
+        /// What runs the points
+        #[arg(long, default_value = "auto")]
+        backend: Machine,
+        /// Number of threads [default: all cores]
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+        threads: Option<u16>,
+        /// No progress bar
+        #[arg(short, long)]
+        quiet: bool,
+    },
     /// Run every case of a folder to its end, and say which do not show what their `expect` says.
     Stability {
         /// Folder of cases
@@ -287,11 +309,7 @@ fn perform(command: Command) -> Result<Done> {
             return Ok(Done { text: outcome.to_string(), code });
         }
         Command::Mesh { case, output } => {
-            let dir = output.unwrap_or_else(|| {
-                let mut dir = directory::default(&case.case).into_os_string();
-                dir.push("-mesh");
-                dir.into()
-            });
+            let dir = output.unwrap_or_else(|| beside(&case.case, "-mesh"));
             run::mesh(&case.read()?, &dir)?
         }
         Command::Check { case, explain } => run::check(&case.read()?, explain)?,
@@ -306,20 +324,28 @@ fn perform(command: Command) -> Result<Done> {
             output.map_or(Ok(()), |path| comparison.write(&path))?;
             if json { format!("{:#}", comparison.json()) } else { comparison.text() }
         }
+        Command::Study { study: StudyCommand::Accuracy { case, output, points, backend, threads, quiet } } => {
+            let options = accuracy::Options {
+                output: output.unwrap_or_else(|| beside(&case.case, "-accuracy")),
+                points,
+                machine: backend.into(),
+                threads: threads.map(usize::from),
+                quiet,
+            };
+            let study = accuracy(&case.case, &case.set, &options)?;
+            return Ok(Done { text: study.text, code: if study.interrupted { INTERRUPTED } else { 0 } });
+        }
         Command::Study { study: StudyCommand::Stability { folder, backend, output } } => {
             let study = stability(&folder, backend.into(), &output)?;
             return Ok(Done { text: study.text, code: if study.held { 0 } else { UNEXPECTED } });
         }
         Command::Study { study: StudyCommand::Effects { case, only, precision, threads, backend, output, force } } => {
             let loaded = case.read()?;
-            let table = output.unwrap_or_else(|| {
-                let mut name = directory::default(&case.case).into_os_string();
-                name.push("-effects.csv");
-                name.into()
-            });
+            let table = output.unwrap_or_else(|| beside(&case.case, "-effects.csv"));
             let precision = precision.map_or(loaded.case.integration.precision, Into::into);
             let make = run::make(precision, backend.into(), threads.map(usize::from), "")?;
-            effects(&loaded, &effects::Options { make, only, table, force })?
+            let study = effects(&loaded, &effects::Options { make, only, table, force })?;
+            return Ok(Done { text: study.text, code: if study.interrupted { INTERRUPTED } else { 0 } });
         }
         Command::Picture { source, field, width, output } => {
             let out = output.unwrap_or_else(|| picture_path(&source));
@@ -327,6 +353,13 @@ fn perform(command: Command) -> Result<Done> {
         }
     };
     Ok(Done { text, code: 0 })
+}
+
+/// The default folder of results of a case, with something behind its name.
+fn beside(case: &Path, what: &str) -> PathBuf {
+    let mut dir = directory::default(case).into_os_string();
+    dir.push(what);
+    dir.into()
 }
 
 fn picture_path(source: &Path) -> PathBuf {

@@ -161,7 +161,7 @@ fn a_scene_without_an_effect_has_no_trace_of_it() {
         ),
         absent(
             "bending",
-            &["buffer bend", "stage bend", "bend_force", "bend_slots", "SMOOTHING", "bending energy"],
+            &["buffer bend", "stage bend", "bend_force", "bend_slots", "SMOOTHING"],
             &cell,
             &[("/effects/bending", json!(false))],
         ),

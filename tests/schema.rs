@@ -124,3 +124,35 @@ fn defaults_are_in_the_schema_and_in_range() {
         assert!(loaded.defaults.iter().any(|(path, _)| path.starts_with(&format!("{name}."))));
     }
 }
+
+/// A word for the accuracy stands for fields that the case leaves out, and they are named among its defaults.
+#[test]
+fn an_accuracy_fills_what_a_case_leaves_out() {
+    let cell = |sets: &[&str]| {
+        let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
+        read(Path::new("cases/unit_cell_shear.json"), &sets)
+    };
+    let plain = cell(&[]).unwrap().case;
+    for word in ["preview", "engineering", "reference"] {
+        let loaded = cell(&[&format!("accuracy={word}")]).unwrap();
+        assert!(loaded.case.resolution != plain.resolution, "{word}");
+        let full = serde_json::to_value(&loaded.case).unwrap();
+        conform(&full, Shape::new(&schema::case())).unwrap();
+        let fields = loaded.case.accuracy.unwrap().fields();
+        let mut count = 0;
+        for (group, fields) in fields.as_object().unwrap() {
+            for (name, value) in fields.as_object().unwrap() {
+                let path = format!("{group}.{name}");
+                let stated = &loaded.defaults.iter().find(|(place, _)| *place == path).expect("it is stated").1;
+                assert_eq!(full[group][name], *stated, "{path}");
+                assert!(stated == value || stated.as_f64() == value.as_f64(), "{path}: {stated} for {value}");
+                count += 1;
+            }
+        }
+        assert!(count > 0, "{word} says something");
+    }
+    let own = cell(&["accuracy=preview", "resolution.finer=2", "integration.dt_max_s=1e-7"]).unwrap().case;
+    assert_eq!((own.resolution.finer, own.integration.dt_max_s), (2.0, 1e-7));
+    let message = cell(&["accuracy=best"]).unwrap_err().to_string();
+    assert!(message.contains("engineering"), "{message}");
+}

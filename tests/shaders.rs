@@ -43,6 +43,16 @@ fn scenes() -> Vec<(&'static str, Value)> {
     let lines = with(free.clone(), &[("/effects/fibre_lines", json!({})), ("/effects/contact", json!({}))]);
     let without_mass = with(cell.clone(), &[("/effects/contact_mass", Value::Null)]);
     let falling = with(lines.clone(), &[("/effects/gravity_mm_s2", Value::Null)]);
+    let rough = with(lines.clone(), &[("/domain/mesh/friction", json!(0.3)), ("/effects/damping", json!({}))]);
+    let smooth = with(
+        cell.clone(),
+        &[
+            ("/fabric/friction", json!(0)),
+            ("/fabric/stitch/thermal_strain", json!(0)),
+            ("/effects/bending", json!(false)),
+            ("/effects/damping", Value::Null),
+        ],
+    );
     vec![
         ("cell", cell),
         ("cell without contact mass", without_mass),
@@ -52,6 +62,8 @@ fn scenes() -> Vec<(&'static str, Value)> {
         ("without gravity", falling),
         ("cell of reduced hexahedra", reduced(coarse_cell())),
         ("free reduced hexahedra", reduced(free)),
+        ("free with friction and damping", rough),
+        ("cell without friction, thermal strain, bending and damping", smooth),
     ]
 }
 
@@ -191,6 +203,6 @@ fn every_twin_compiles_and_sees_what_its_stage_binds() {
         failed += usize::from(catch_unwind(|| check(&name, &stage, &buffers)).is_err());
     }
     println!("{seen:#?}");
-    assert!(seen.len() == 28, "{} kinds of stages", seen.len());
+    assert!(seen.len() == 29, "{} kinds of stages", seen.len());
     assert_eq!(failed, 0, "stages without a twin that fits; see above");
 }

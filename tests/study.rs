@@ -7,8 +7,12 @@ use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::time::SystemTime;
+use tricot::case::read::read;
 use tricot::output::columns::Columns;
-use tricot::study::difference::relative_l2;
+use tricot::run::{self, Machine};
+use tricot::study::accuracy::{Options, accuracy};
+use tricot::study::difference::{difference, relative_l2};
 use tricot::study::results::{MEASURES, Results};
 
 /// A coarse cell that is tightened and sheared by little, as a file.
@@ -92,4 +96,89 @@ fn comparisons_say_what_the_tables_say() {
     let none = tricot(&["compare", folder.path().to_str().unwrap(), b.folder.to_str().unwrap()]);
     assert_eq!(none.status.code(), Some(4));
     assert!(String::from_utf8_lossy(&none.stderr).contains("no history.csv"));
+}
+
+/// A study of a cell that is sheared at once.
+fn study(case: &Path, sets: &[&str], points: &[&str], dir: &Path) -> String {
+    let hurried = ["steps.0.pretension.time_s=8e-5", "steps.1.shear.time_s=5e-5"];
+    let sets: Vec<String> = hurried.iter().chain(sets).map(|s| (*s).to_owned()).collect();
+    let points = points.iter().map(|s| (*s).to_owned()).collect();
+    let options = Options { output: dir.to_path_buf(), points, machine: Machine::Cpu, threads: Some(2), quiet: true };
+    let study = accuracy(case, &sets, &options).unwrap_or_else(|e| panic!("{e}"));
+    assert!(!study.interrupted);
+    study.text
+}
+
+#[test]
+fn a_study_says_what_its_runs_say_and_runs_none_of_them_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let (case, dir) = (cell(folder.path()), folder.path().join("study"));
+    let told = study(&case, &[], &["loading × 0.5", "beams × 0.6"], &dir);
+    println!("{told}");
+    let table = Columns::read(&dir.join("accuracy.csv")).unwrap();
+    let labels = table.texts("point");
+    let expected = ["default", "one quantum less", "one quantum more", "reference", "beams × 0.6", "loading × 0.5"];
+    assert_eq!(labels, expected);
+    assert!(labels.iter().all(|label| told.contains(label)), "{told}");
+    let times = table.numbers("time_over_default");
+    assert!(times[0] == 1.0 && times.iter().all(|time| *time > 0.1), "{times:?}");
+    // fifteen times the work, whatever the machine does meanwhile
+    assert!(times[3] > 4.0, "{times:?}");
+
+    // errors are differences from the reference, and none is claimed that chance alone may make
+    let json: Value = serde_json::from_slice(&fs::read(dir.join("accuracy.json")).unwrap()).unwrap();
+    let of = |name: &str| Results::read(&dir.join("points").join(name)).unwrap();
+    let (reference, chance) = (of("reference"), json["by_chance"]["F_nor"].as_f64().unwrap());
+    assert!(chance > 0.0);
+    for (row, name) in ["default", "one-quantum-less", "one-quantum-more", "reference", "beams-0.6", "loading-0.5"]
+        .into_iter()
+        .enumerate()
+    {
+        let stated = json["points"][row]["errors"]["F_nor"]["l2"].as_f64().unwrap();
+        let found = difference(&of(name).curve(&MEASURES[0]), &reference.curve(&MEASURES[0])).unwrap().l2;
+        assert!((stated - found).abs() <= 1e-12 * found, "{name}: {stated} for {found}");
+        let cell = table.texts("error_f_nor")[row];
+        let claimed: f64 = cell.trim_start_matches('<').parse().unwrap();
+        assert_eq!((claimed, cell.starts_with('<')), (found.max(chance), found < chance), "{name}");
+    }
+
+    // the flags of a point are those that make it, from the tightened state where only the loading differs
+    let flags = table.texts("flags");
+    assert_eq!(flags[4], "--set resolution.beams_per_lap=19");
+    assert!(flags[5].starts_with("--set steps.1.shear.time_s=2.5e-5 --from points/default/state/"), "{}", flags[5]);
+    let hash = |dir: &Path| {
+        let summary: Value = serde_json::from_slice(&fs::read(dir.join("summary.json")).unwrap()).unwrap();
+        summary["state_hash"].as_str().unwrap().to_owned()
+    };
+    let sets = ["steps.0.pretension.time_s=8e-5", "steps.1.shear.time_s=5e-5", "resolution.beams_per_lap=19"];
+    let again = run::Options {
+        output: folder.path().join("again"),
+        precision: None,
+        threads: Some(1),
+        machine: Machine::Cpu,
+        adapter: String::new(),
+        force: false,
+        resume: false,
+        from: None,
+        quiet: true,
+    };
+    run::run(&read(&case, &sets.map(String::from)).unwrap(), &again).unwrap();
+    assert_eq!(hash(&again.output), hash(&dir.join("points/beams-0.6")));
+
+    let page = fs::read_to_string(dir.join("accuracy.html")).unwrap();
+    assert!(page.contains("beams × 0.6") && page.matches("<svg").count() >= 6);
+    let chart = fs::read_to_string(dir.join("accuracy.svg")).unwrap();
+    assert!(chart.contains("error of F_nor") && chart.contains("loading × 0.5"));
+
+    // the same points are found, a new one is run, and another case is another study
+    let written = |name: &str| -> SystemTime {
+        fs::metadata(dir.join("points").join(name).join("point.json")).unwrap().modified().unwrap()
+    };
+    let before = ["default", "reference", "beams-0.6"].map(written);
+    let told = study(&case, &[], &["beams × 0.6", "β × 2"], &dir);
+    assert_eq!(before, ["default", "reference", "beams-0.6"].map(written));
+    assert!(told.contains("β × 2") && dir.join("points/b-2/point.json").is_file(), "{told}");
+    study(&case, &["fabric.friction=0.3"], &["beams × 0.6"], &dir);
+    let after = ["default", "reference", "beams-0.6"].map(written);
+    assert!(before.iter().zip(after).all(|(before, after)| *before < after));
 }

@@ -24,7 +24,7 @@ fn each_effect_is_turned_off_in_turn_and_compared() {
     let folder = tempfile::tempdir().unwrap();
     let case = loaded(&with(coarse_cell(), &[("/output", json!({ "rows_per_step": 30 }))]));
     let options = options(folder.path(), &["thread-yarn contact", "bending", "fibre lines"]);
-    let text = effects(&case, &options).unwrap_or_else(|e| panic!("{e}"));
+    let text = effects(&case, &options).unwrap_or_else(|e| panic!("{e}")).text;
     println!("{text}");
     let table = Columns::read(&options.table).unwrap();
     let names = ["nothing (a quantum aside)", "thread-yarn contact", "bending", "fibre lines"];

@@ -65,10 +65,15 @@ fn between(a: u32, b: u32, image: vec2<i32>) -> FromSlave {
 @group(1) @binding(6) var<storage, read> arcs: array<f32>;
 @group(1) @binding(7) var<storage, read> counts: array<u32>;
 @group(1) @binding(8) var<storage, read> lists: array<u32>;
+#if PERIODIC
 @group(1) @binding(9) var<storage, read> boxes: array<f32>;
-@group(1) @binding(10) var<storage, read_write> keys: array<u32>;
-@group(1) @binding(11) var<storage, read_write> states: array<f32>;
-@group(1) @binding(12) var<storage, read_write> status: array<atomic<u32>>;
+const WRITES: u32 = 10u;
+#else
+const WRITES: u32 = 9u;
+#endif
+@group(1) @binding(WRITES) var<storage, read_write> keys: array<u32>;
+@group(1) @binding(WRITES + 1u) var<storage, read_write> states: array<f32>;
+@group(1) @binding(WRITES + 2u) var<storage, read_write> status: array<atomic<u32>>;
 
 // Pairs that a beam can have.
 const MOST_PAIRS: u32 = 64u;
@@ -90,8 +95,8 @@ fn pairs(beam: u32) {
     let period = vec2<f32>(params.period) * QUANTUM;
 #endif
     let reach = 2.0 * params.thread_radius + params.skin;
-    let at_box = BOX * (params.slabs + beam);
 #if PERIODIC
+    let at_box = BOX * (params.slabs + beam);
     let middle = vec2<f32>(boxes[at_box], boxes[at_box + 1u]);
 #endif
     let own = vector(beam);

@@ -1,4 +1,9 @@
-// Axial part of a 2-node beam. What includes this binds `ends`, `beams`, `quanta` and `remainder`.
+// Axial part of a 2-node beam. What includes this binds `ends`, `beams`, `quanta` and `remainder`, with VIRIAL in periodic scenes
+// also `virial`.
+
+#if ROOT
+#define VIRIAL
+#endif
 
 #include "kernel/row"
 #include "kernel/node"
@@ -24,6 +29,7 @@ fn vector(beam: u32) -> Beam {
 #endif
 }
 
+#if VIRIAL
 #if PERIODIC
 // Adds `force ⊗ reference` to the nine numbers of an item in the buffer bound as `virial`.
 fn add_virial(item: u32, force: vec3<f32>, reference: vec3<f32>) {
@@ -37,6 +43,7 @@ fn add_row(at: u32, row: vec3<f32>) {
     virial[at + 1u] = virial[at + 1u] + row.y;
     virial[at + 2u] = virial[at + 2u] + row.z;
 }
+#endif
 #endif
 
 #if ROOT

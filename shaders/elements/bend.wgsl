@@ -1,5 +1,6 @@
 // Bending between two consecutive beams, without rotational unknowns.
 
+#define VIRIAL
 #include "elements/beam2"
 
 // Numbers of a bend in the table.

@@ -1,5 +1,6 @@
 //! What a user writes: a typed, checked JSON case.
 
+pub mod accuracy;
 pub mod check;
 pub mod conform;
 pub mod defaults;
@@ -16,6 +17,7 @@ pub mod read;
 pub mod schema;
 pub mod steps;
 
+use accuracy::Accuracy;
 use domain::{Domain, Resolution};
 use effects::Effects;
 use expect::Expect;
@@ -37,6 +39,10 @@ pub struct Case {
     pub fabric: Option<FabricSource>,
     /// The piece of fabric.
     pub domain: Domain,
+    /// How much accuracy to buy with time: a word for numerical fields that the case does not give itself. `null` (the
+    /// default) for their own defaults.
+    #[serde(default)]
+    pub accuracy: Option<Accuracy>,
     /// How finely it is meshed.
     #[serde(default)]
     pub resolution: Resolution,

@@ -1,5 +1,6 @@
 //! From a case file and the command line to a typed case whose every number has been checked.
 
+use super::accuracy::{Accuracy, fill};
 use super::check;
 use super::conform::conform;
 use super::defaults;
@@ -19,7 +20,7 @@ pub struct Loaded {
     pub case: Case,
     /// The fabric; `None` only for an inline mesh.
     pub fabric: Option<Fabric>,
-    /// Every default that was used: JSON path and value.
+    /// Everything that was not written: JSON path and value, by default or by the accuracy that was asked for.
     pub defaults: Vec<(String, Value)>,
     /// Where the parts were written; makes errors that name their file.
     pub origin: Origin,
@@ -43,6 +44,10 @@ pub fn read(path: &Path, overrides: &[String]) -> Result<Loaded> {
     }
     inline_fabric(&mut value, &mut origin)?;
     conform(&value, Shape::new(&schema)).map_err(|fault| origin.error(&fault.path, fault.message))?;
+    let written = value.clone();
+    if let Some(accuracy) = Accuracy::of(&value) {
+        fill(&mut value, &accuracy.fields());
+    }
     let case: Case = serde_path_to_error::deserialize(&value)
         .map_err(|e| origin.error(&e.path().to_string(), e.inner().to_string()))?;
     let fabric = match &case.fabric {
@@ -51,7 +56,7 @@ pub fn read(path: &Path, overrides: &[String]) -> Result<Loaded> {
     };
     check::check(&case, &origin)?;
     let full = serde_json::to_value(&case).map_err(|e| origin.error("", e.to_string()))?;
-    let defaults = defaults::used(&value, &full);
+    let defaults = defaults::used(&written, &full);
     Ok(Loaded { case, fabric, defaults, origin })
 }
 

@@ -110,15 +110,18 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
         const ARCS: usize = 6;
         const COUNTS: usize = 7;
         const ITEMS: usize = 8;
+        // only in periodic scenes; else all writes are one number earlier
         const BOXES: usize = 9;
+        let missing = usize::from(!PERIODIC);
         let params: Params = io.params();
         let constant = L::Scalar::from_f64;
         let scene = Scene::<_, PERIODIC>::new(io, params.period);
         let (threads, arcs) = (io.uints(THREADS), io.scalars(ARCS));
-        let (counts, lists, boxes) = (io.uints(COUNTS), io.uints(ITEMS), io.scalars(BOXES));
-        let mut keys = io.own::<u32>(10);
-        let mut states = io.own::<L::Scalar>(11);
-        let flags = io.atomic_uints(12);
+        let (counts, lists) = (io.uints(COUNTS), io.uints(ITEMS));
+        let boxes = if PERIODIC { io.scalars(BOXES) } else { &[] };
+        let mut keys = io.own::<u32>(10 - missing);
+        let mut states = io.own::<L::Scalar>(11 - missing);
+        let flags = io.atomic_uints(12 - missing);
         let inverse = inverse::<_, PERIODIC>(&io.row.gradient);
         let period = params.period.map(|p| L::Scalar::from_i32(p) * constant(QUANTUM));
         let reach = constant(f64::from(2.0 * params.thread_radius + params.skin));
@@ -127,7 +130,7 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
             // in ascending order
             let mut found = [EMPTY; MOST_PAIRS];
             let mut count = 0;
-            let middle = &boxes[BOX * (params.slabs as usize + beam)..][..BOX];
+            let middle = |item: usize, k: usize| boxes[BOX * item + k];
             let (_, along) = scene.vector(beam);
             let (start, _) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, scene.ends[2 * beam] as usize);
             let back = pull_back(&inverse, along);
@@ -157,10 +160,12 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
                                 continue;
                             }
                         }
-                        let theirs = &boxes[BOX * near as usize..][..BOX];
                         let image = [0, 1].map(|k| {
-                            let repeats = PERIODIC && params.period[k] != 0;
-                            if repeats { ((middle[k] - theirs[k]) / period[k]).to_i32() } else { 0 }
+                            if !PERIODIC || params.period[k] == 0 {
+                                return 0;
+                            }
+                            let apart = middle(params.slabs as usize + beam, k) - middle(near as usize, k);
+                            (apart / period[k]).to_i32()
                         });
                         let (_, apart) = scene.between(beam, other, image);
                         let (_, direction) = scene.vector(other);

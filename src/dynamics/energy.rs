@@ -5,7 +5,7 @@ use crate::elements::beam2::TABLE;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
 use crate::kernel::position::QUANTUM;
-use crate::kernel::shader::{Shader, Share};
+use crate::kernel::shader::{Shader, Share, when};
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{add, apply, dot};
 use bytemuck::{Pod, Zeroable};
@@ -34,7 +34,8 @@ pub struct Kinetic<const TOTAL: bool>;
 
 impl<const TOTAL: bool> Kernel for Kinetic<TOTAL> {
     const SHADER: Shader = Shader {
-        defines: if TOTAL { &["TOTAL"] } else { &[] },
+        // only a periodic cell deforms as a whole
+        defines: &[when(TOTAL, "TOTAL"), when(TOTAL, "PERIODIC")],
         share: Share::Workgroups(1),
         ..Shader::new("dynamics/energy", "kinetic")
     };

@@ -5,7 +5,7 @@
 //!   [`columns`] reads them back; [`map`]: points with values;
 //! - [`picture`] renders a frame: [`scene`] turns it into triangles, [`raster`] draws those into a depth buffer and lights
 //!   them, [`image`] holds pixels, with letters from [`text`] and colours from [`colour`];
-//! - [`page`]: a page of HTML that stands by itself, with charts from [`chart`];
+//! - [`page`]: a page of HTML that stands by itself, with charts from [`chart`] and [`scatter`];
 //! - [`checkpoint`]: the state of a run in one file, to go on from;
 //! - [`mod@file`]: how a file is replaced as a whole or not at all.
 
@@ -20,6 +20,7 @@ pub mod map;
 pub mod page;
 pub mod picture;
 pub mod raster;
+pub mod scatter;
 pub mod scene;
 pub mod table;
 pub mod text;

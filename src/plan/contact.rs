@@ -211,7 +211,8 @@ impl ContactScene<'_> {
         let state = b.add("beam pair state", Kind::Scalar, size * slots * beams, true, Initial::Zero);
         let sums = b.scratch("beam pair sums", penalty::sums(friction, periodic) * beams);
         let common = [&[self.ends, self.beams][..], &self.place()].concat();
-        let reads = [&common[..], &[of, arcs, search.counts, search.lists, search.boxes]].concat();
+        let mut reads = [&common[..], &[of, arcs, search.counts, search.lists]].concat();
+        reads.extend(periodic.then_some(search.boxes));
         let keys_own = (keys, own(1, slots));
         let state_own = (state, own(1, size * slots));
         let writes = [keys_own, state_own, self.status()];

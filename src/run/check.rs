@@ -74,7 +74,7 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
                 };
                 let _ = write!(
                     t,
-                    "\n  {:<14} {:>7} items  reads {}; writes {}",
+                    "\n  {:<24} {:>7} items  reads {}; writes {}",
                     stage.name,
                     stage.count,
                     names(stage.reads.clone()),

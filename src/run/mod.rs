@@ -19,6 +19,7 @@ pub use devices::devices;
 pub use mesh::mesh;
 pub use picture::picture;
 pub use report::report;
+pub use resume::may_differ;
 
 use crate::backend::gpu::{self, Device};
 use crate::case::Case;
@@ -43,8 +44,8 @@ use rows::STRESS;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
-use std::time::Instant;
+use std::sync::{Arc, LazyLock};
+use std::time::{Duration, Instant};
 
 /// The case in a folder of results, with every default written out.
 pub const CASE: &str = "case.json";
@@ -149,8 +150,7 @@ pub fn simulation_at(loaded: &Loaded, make: Make, state: &Path) -> Result<Simula
 /// Bad input, a folder that cannot be used, a guard that stopped the run, or a device that failed; what was computed by then
 /// stays on disk.
 pub fn run(loaded: &Loaded, options: &Options) -> Result<Outcome> {
-    let precision = options.precision.unwrap_or(loaded.case.integration.precision);
-    run_on(loaded, options, make(precision, options.machine, options.threads, &options.adapter)?)
+    run_watched(loaded, options, &mut || Duration::ZERO)
 }
 
 /// Runs a case on a machine that is ready, whatever the options say of it.
@@ -158,6 +158,19 @@ pub fn run(loaded: &Loaded, options: &Options) -> Result<Outcome> {
 /// # Errors
 /// As of [`run`].
 pub fn run_on(loaded: &Loaded, options: &Options, make: Make) -> Result<Outcome> {
+    drive(loaded, options, make, &mut || Duration::ZERO)
+}
+
+/// Runs a case and calls `watch` behind every row of the tables; the time that it says to have taken does not count.
+///
+/// # Errors
+/// As of [`run`].
+pub fn run_watched(loaded: &Loaded, options: &Options, watch: &mut dyn FnMut() -> Duration) -> Result<Outcome> {
+    let precision = options.precision.unwrap_or(loaded.case.integration.precision);
+    drive(loaded, options, make(precision, options.machine, options.threads, &options.adapter)?, watch)
+}
+
+fn drive(loaded: &Loaded, options: &Options, make: Make, watch: &mut dyn FnMut() -> Duration) -> Result<Outcome> {
     let mut loaded = loaded.clone();
     loaded.case.integration.precision = make.precision;
     let mut simulation = simulation(&loaded, make)?;
@@ -166,24 +179,20 @@ pub fn run_on(loaded: &Loaded, options: &Options, make: Make) -> Result<Outcome>
         directory::prepare(&options.output, options.force)?;
         write_case(&loaded.case, &options.output)?;
     }
-    let mut run = Run::new(&loaded, options, simulation, interruption())?;
+    let mut run = Run::new(&loaded, options, simulation, Arc::clone(&STOPPED))?;
     run.take_up(start)?;
-    let result = run.go();
+    let result = run.go(watch);
     run.finish(result)
 }
 
-/// Whether the user has stopped the process, and with it this run and those after it.
-fn interruption() -> Arc<AtomicBool> {
-    static STOPPED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
-    let listen = || {
-        let stopped = Arc::new(AtomicBool::new(false));
-        let heard = Arc::clone(&stopped);
-        // without a handler the process ends at once, as if nothing had been asked of it
-        let _ = ctrlc::set_handler(move || heard.store(true, Ordering::Relaxed));
-        stopped
-    };
-    Arc::clone(STOPPED.get_or_init(listen))
-}
+/// Set by an interrupt: every run of the process stops then. The handler of a process cannot be replaced.
+static STOPPED: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| {
+    let stopped = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stopped);
+    // without a handler an interrupt ends the process, as it would end any other
+    let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
+    stopped
+});
 
 /// One run with its files.
 struct Run<'a> {
@@ -278,7 +287,7 @@ impl<'a> Run<'a> {
     }
 
     /// All load steps, or those that are left.
-    fn go(&mut self) -> Result<()> {
+    fn go(&mut self, watch: &mut dyn FnMut() -> Duration) -> Result<()> {
         let output = &self.loaded.case.output;
         let phases = self.simulation.schedule.phases().to_vec();
         let bar = self.bar();
@@ -304,6 +313,7 @@ impl<'a> Run<'a> {
                 let until = phase.start + (phase.end - phase.start) * row as f64 / rows as f64;
                 let arrived = self.reach(until)?;
                 self.write_row(phase.name)?;
+                self.started += watch();
                 self.tell(&bar, phase.name);
                 let now = loaded(self.simulation.load());
                 while marks.get(self.place.marks).is_some_and(|mark| now >= *mark) {

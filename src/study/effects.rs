@@ -41,6 +41,15 @@ pub struct Options {
     pub force: bool,
 }
 
+/// What a study found.
+#[derive(Debug, Clone)]
+pub struct Study {
+    /// The table as text.
+    pub text: String,
+    /// The user stopped it; the table holds what was done by then.
+    pub interrupted: bool,
+}
+
 /// A scene that was run.
 struct Done {
     loaded: Loaded,
@@ -61,25 +70,26 @@ struct Row {
     changes: Vec<f64>,
 }
 
-/// Runs a scene with all its effects and without each, and writes the table row by row; the table as text.
+/// Runs a scene with all its effects and without each, and writes the table row by row.
 ///
 /// # Errors
 /// An effect that the scene does not have, a folder that is in use, a table that cannot be written. A guard that stops a variant is
 /// its verdict.
-pub fn effects(loaded: &Loaded, options: &Options) -> Result<String> {
+pub fn effects(loaded: &Loaded, options: &Options) -> Result<Study> {
     let scene = plain(loaded, options);
     let mut variants = vec![(NOTHING, aside(&scene))];
     variants.extend(chosen(&scene, options)?);
     let folder = options.table.with_extension("");
     directory::check(&folder, options.force)?;
-    let whole = finish(&scene, &folder.join("all"), options)?;
+    let interrupted = || Study { text: "interrupted".into(), interrupted: true };
+    let Some(whole) = finish(&scene, &folder.join("all"), options)? else { return Ok(interrupted()) };
     let measures: Vec<&Measure> = MEASURES.iter().filter(|m| !whole.results.curve(m).is_empty()).collect();
     let header = COLUMNS.map(String::from).into_iter().chain(measures.iter().map(|m| m.name.replace(' ', "_") + "_l2"));
     let header: Vec<String> = header.collect();
     let mut table = Table::create(&options.table, &header.iter().map(String::as_str).collect::<Vec<_>>())?;
     let mut rows = Vec::new();
     for (name, variant) in variants {
-        let done = finish(&variant, &folder.join(slug(name)), options)?;
+        let Some(done) = finish(&variant, &folder.join(slug(name)), options)? else { return Ok(interrupted()) };
         let row = compare(name, &done, &whole, &measures, options)?;
         let cells: Vec<Cell> = [row.name.into(), row.verdict.as_str().into()]
             .into_iter()
@@ -89,7 +99,7 @@ pub fn effects(loaded: &Loaded, options: &Options) -> Result<String> {
         table.row(&cells)?;
         rows.push(row);
     }
-    Ok(text(&whole, &measures, &rows, &options.table))
+    Ok(Study { text: text(&whole, &measures, &rows, &options.table), interrupted: false })
 }
 
 /// The scene with a checkpoint after every load step, and no pictures.
@@ -131,8 +141,8 @@ fn slug(name: &str) -> String {
     name.split(" (").next().unwrap_or(name).chars().map(letters).collect()
 }
 
-/// Runs a scene to its end or to a guard.
-fn finish(scene: &Loaded, folder: &Path, options: &Options) -> Result<Done> {
+/// Runs a scene to its end or to a guard; `None` if the user stopped it.
+fn finish(scene: &Loaded, folder: &Path, options: &Options) -> Result<Option<Done>> {
     let how = run::Options {
         output: folder.into(),
         precision: None,
@@ -145,12 +155,13 @@ fn finish(scene: &Loaded, folder: &Path, options: &Options) -> Result<Done> {
         quiet: true,
     };
     let verdict = match run::run_on(scene, &how, options.make.clone()) {
-        Ok(outcome) if outcome.interrupted => return Err(Error::file(folder, "was interrupted")),
+        Ok(outcome) if outcome.interrupted => return Ok(None),
         Ok(_) => "finished".into(),
         Err(Error::Guard(guard)) => guard.cause,
         Err(error) => return Err(error),
     };
-    Ok(Done { loaded: scene.clone(), folder: folder.into(), verdict, results: Results::read(folder)? })
+    let results = Results::read(folder)?;
+    Ok(Some(Done { loaded: scene.clone(), folder: folder.into(), verdict, results }))
 }
 
 /// What a variant costs and changes.

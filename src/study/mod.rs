@@ -1,8 +1,10 @@
 //! Many runs at once: tables over a folder of scenes, and how results differ.
 //!
 //! [`difference`] holds the mathematics of comparing curves, [`results`] reads them from the folder of a run, and
-//! [`compare`] says how two folders differ; [`effects`] turns off the effects of a scene one by one.
+//! [`compare`] says how two folders differ. [`accuracy`] runs a case many times, to measure what accuracy costs; [`effects`] turns
+//! its effects off one by one.
 
+pub mod accuracy;
 pub mod compare;
 pub mod difference;
 pub mod effects;

@@ -1,0 +1,72 @@
+//! `"accuracy"`: how much accuracy to buy with time, as one word for many numerical choices.
+//!
+//! The words stand for fields of a case. A field that the case gives itself stays as it is, so a word can be used as a start.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+/// Numerical choices by name. `tricot study accuracy` measures the error and the time of each for a case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Accuracy {
+    /// A first look: `resolution.finer` 0.6, `integration.dt_max_s` 7e-7.
+    Preview,
+    /// For results: `resolution.beams_per_lap` 110, everything else as by default.
+    Engineering,
+    /// To judge the others by: `resolution.finer` 1.5, `resolution.beams_per_lap` 90, `integration.precision` f64,
+    /// `integration.dt_max_s` 2.5e-7.
+    Reference,
+}
+
+impl Accuracy {
+    /// The fields of a case that the word stands for.
+    pub fn fields(self) -> Value {
+        match self {
+            Self::Preview => json!({ "resolution": { "finer": 0.6 }, "integration": { "dt_max_s": 7e-7 } }),
+            Self::Engineering => json!({ "resolution": { "beams_per_lap": 110 } }),
+            Self::Reference => json!({
+                "resolution": { "finer": 1.5, "beams_per_lap": 90 },
+                "integration": { "precision": "f64", "dt_max_s": 2.5e-7 }
+            }),
+        }
+    }
+
+    /// The word in a case that has the shape of one.
+    pub fn of(case: &Value) -> Option<Self> {
+        case.get("accuracy").and_then(|word| serde_json::from_value(word.clone()).ok()).flatten()
+    }
+}
+
+/// Adds the fields of an object that another one leaves out.
+pub fn fill(given: &mut Value, fields: &Value) {
+    let (Value::Object(given), Value::Object(fields)) = (given, fields) else { return };
+    for (name, field) in fields {
+        match given.get_mut(name) {
+            Some(own) => fill(own, field),
+            None => {
+                given.insert(name.clone(), field.clone());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_given_stays() {
+        let mut case = json!({ "resolution": { "finer": 2 }, "integration": null });
+        fill(&mut case, &Accuracy::Reference.fields());
+        let expected = json!({ "resolution": { "finer": 2, "beams_per_lap": 90 }, "integration": null });
+        assert_eq!(case, expected);
+    }
+
+    #[test]
+    fn words_are_read() {
+        assert_eq!(Accuracy::of(&json!({ "accuracy": "preview" })), Some(Accuracy::Preview));
+        assert_eq!(Accuracy::of(&json!({ "accuracy": null })), None);
+        assert_eq!(Accuracy::of(&json!({})), None);
+    }
+}

@@ -1,0 +1,137 @@
+//! What the runs of a study say: errors, times, and which points nothing else beats.
+
+use super::points::{Point, Ran, Role};
+use crate::error::Result;
+use crate::study::difference::{Curve, Difference, by_chance, difference, relative_l2, smoothed, spread};
+use crate::study::results::{MEASURES, Measure, Results};
+use std::path::PathBuf;
+
+/// A point that was run.
+pub struct Row {
+    pub point: Point,
+    pub ran: Ran,
+    pub results: Option<Results>,
+    /// Time over that of the case itself; NaN if it did not finish.
+    pub time: f64,
+    /// Differences from the reference and from the case itself, by measure; `None` if it did not finish.
+    pub errors: Vec<Option<Difference>>,
+    pub changes: Vec<Option<Difference>>,
+    /// Whether no other point is both faster and better in the first measure.
+    pub front: bool,
+}
+
+/// A study, as far as it has come.
+pub struct Findings {
+    pub measures: Vec<&'static Measure>,
+    /// How far two runs are apart by chance, by measure: relative L2.
+    pub chance: Vec<f64>,
+    pub rows: Vec<Row>,
+}
+
+impl Findings {
+    /// Of points with their runs and folders, the case itself first.
+    ///
+    /// # Errors
+    /// Results that cannot be read.
+    pub(super) fn of(points: &[(Point, Ran, PathBuf)]) -> Result<Self> {
+        let mut rows = Vec::new();
+        for (point, ran, folder) in points {
+            let results = ran.finished().then(|| Results::read(folder)).transpose()?;
+            let (point, ran) = (point.clone(), ran.clone());
+            rows.push(Row { point, ran, results, time: f64::NAN, errors: vec![], changes: vec![], front: false });
+        }
+        let of = |role: Role| rows.iter().find(|row| row.point.role == role).and_then(|row| row.results.as_ref());
+        let default = of(Role::Default);
+        let has = |measure: &&Measure| default.is_some_and(|results| !results.curve(measure).is_empty());
+        let measures: Vec<&'static Measure> = MEASURES.iter().filter(has).collect();
+        let curves = |results: Option<&Results>| -> Vec<Curve> {
+            measures.iter().map(|m| results.map_or_else(Curve::new, |results| results.curve(m))).collect()
+        };
+        let (reference, itself) = (curves(of(Role::Reference)), curves(default));
+        let alike = rows.iter().filter(|row| matches!(row.point.role, Role::Default | Role::Chance));
+        let alike: Vec<Vec<Curve>> = alike.filter_map(|row| row.results.as_ref()).map(|r| curves(Some(r))).collect();
+        let scatter = |k: usize| {
+            let alike: Vec<&[[f64; 2]]> = alike.iter().map(|curves| curves[k].as_slice()).collect();
+            smoothed(&alike).map_or(f64::NAN, |means| by_chance(spread(&means, relative_l2), means.len()))
+        };
+        let chance = (0..measures.len()).map(scatter).collect();
+        let from = |own: &[Curve], other: &[Curve]| own.iter().zip(other).map(|(a, b)| difference(a, b)).collect();
+        let compared: Vec<[Vec<Option<Difference>>; 2]> = rows
+            .iter()
+            .map(|row| {
+                let own = curves(row.results.as_ref());
+                [from(&own, &reference), from(&own, &itself)]
+            })
+            .collect();
+        let unit = rows.first().map(|row| [row.ran.work, row.ran.tightening]).unwrap_or([f64::NAN; 2]);
+        for (row, [errors, changes]) in rows.iter_mut().zip(compared) {
+            (row.errors, row.changes) = (errors, changes);
+            if row.ran.finished() {
+                row.time = (row.ran.work + if row.ran.from_state { unit[1] } else { 0.0 }) / unit[0];
+            }
+        }
+        let mut findings = Self { measures, chance, rows };
+        for row in findings.front() {
+            findings.rows[row].front = true;
+        }
+        Ok(findings)
+    }
+
+    /// Error of a row in a measure, and whether it is above chance: one below is only known to be no larger.
+    pub fn claim(&self, row: &Row, measure: usize) -> Option<(f64, bool)> {
+        let error = row.errors.get(measure).copied().flatten()?.l2;
+        Some(bounded(error, self.chance[measure]))
+    }
+
+    /// As [`claim`](Self::claim), for the difference from the case itself.
+    pub fn effect(&self, row: &Row, measure: usize) -> Option<(f64, bool)> {
+        let change = row.changes.get(measure).copied().flatten()?.l2;
+        Some(bounded(change, self.chance[measure]))
+    }
+
+    /// Rows that no other one beats in time and in the first measure, the fastest first.
+    fn front(&self) -> Vec<usize> {
+        let mut candidates: Vec<(usize, f64, f64)> = Vec::new();
+        for (number, row) in self.rows.iter().enumerate() {
+            if let Some((error, _)) = self.claim(row, 0).filter(|_| row.is_offer() && row.time.is_finite()) {
+                candidates.push((number, row.time, error));
+            }
+        }
+        candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let mut least = f64::INFINITY;
+        candidates.retain(|(.., error)| {
+            let better = *error < least;
+            least = least.min(*error);
+            better
+        });
+        candidates.into_iter().map(|(number, ..)| number).collect()
+    }
+
+    /// Times of runs that should take the same, over that of the case itself: smallest and largest.
+    pub fn repeated(&self) -> [f64; 2] {
+        let alike = self.rows.iter().filter(|row| matches!(row.point.role, Role::Default | Role::Chance));
+        alike.map(|row| row.time).fold([f64::NAN; 2], |[low, high], time| [low.min(time), high.max(time)])
+    }
+
+    /// The row of a role.
+    pub fn row(&self, role: Role) -> Option<&Row> {
+        self.rows.iter().find(|row| row.point.role == role)
+    }
+}
+
+impl Row {
+    /// Whether a user may choose it.
+    pub fn is_offer(&self) -> bool {
+        matches!(self.point.role, Role::Default | Role::Turned)
+    }
+
+    /// A number of its summary; NaN if there is none.
+    pub fn number(&self, name: &str) -> f64 {
+        self.results.as_ref().map_or(f64::NAN, |results| results.number(name))
+    }
+}
+
+/// An error that is at least what chance makes, and whether it was above that.
+fn bounded(error: f64, chance: f64) -> (f64, bool) {
+    if error < chance { (chance, false) } else { (error, true) }
+}

@@ -1,0 +1,98 @@
+//! `tricot study accuracy`: what accuracy costs in time, for the user's own case.
+//!
+//! [`turns`] lists the knobs as data, [`points`] makes a run of each, `stopwatch` times it on a machine that may have other work
+//! to do, [`findings`] compares the runs with the reference, and `write` puts that on disk. A run that is there already is not
+//! run again, so a study that was stopped goes on.
+
+pub mod findings;
+pub mod points;
+mod stopwatch;
+pub mod turns;
+mod write;
+
+use crate::case::parse::reason;
+use crate::error::{Error, Result};
+use crate::run::Machine;
+use findings::Findings;
+use indicatif::{ProgressBar, ProgressStyle};
+use points::{Ran, Role, Runner};
+use std::path::{Path, PathBuf};
+use write::Report;
+
+/// What the command line says about a study, beyond the case.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Folder of the study.
+    pub output: PathBuf,
+    /// Words of which a point must have one in its knob or label; none for all points.
+    pub points: Vec<String>,
+    /// What the points run on, unless that is their knob.
+    pub machine: Machine,
+    /// Number of threads; `None` for all cores.
+    pub threads: Option<usize>,
+    /// No progress.
+    pub quiet: bool,
+}
+
+/// How a study went.
+#[derive(Debug, Clone)]
+pub struct Study {
+    /// The user stopped it; what was run by then is found again.
+    pub interrupted: bool,
+    /// The table for a person.
+    pub text: String,
+}
+
+/// Runs the points of a study that are not there yet, and writes it anew after each of them.
+///
+/// # Errors
+/// A case that cannot be run, points that do not exist, a case or a reference that does not come to its end, or files that
+/// cannot be written.
+pub fn accuracy(case: &Path, sets: &[String], options: &Options) -> Result<Study> {
+    let mut runner = Runner::new(case, sets, options)?;
+    let points = runner.points()?;
+    std::fs::create_dir_all(&options.output).map_err(|e| Error::file(&options.output, reason(&e)))?;
+    let command = ["tricot run".to_owned(), case.display().to_string()]
+        .into_iter()
+        .chain(sets.iter().map(|s| format!("--set {s}")));
+    let (command, title) = (command.collect::<Vec<_>>().join(" "), runner.title());
+    let bar = bar(points.len(), options.quiet);
+    let mut done = Vec::new();
+    let mut study = Study { interrupted: false, text: String::new() };
+    for point in points {
+        bar.set_message(point.label);
+        let Some(ran) = runner.perform(&point)? else {
+            study.interrupted = true;
+            break;
+        };
+        needed(point.role, &ran, case)?;
+        let folder = runner.folder(&point);
+        done.push((point, ran, folder));
+        let findings = Findings::of(&done)?;
+        let report = Report { title: &title, command: &command, findings: &findings };
+        report.write(&options.output)?;
+        study.text = report.text();
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let end = if study.interrupted { "interrupted: the same command goes on" } else { "accuracy.html shows it" };
+    study.text += &format!("\nresults    {}: {end}", options.output.display());
+    Ok(study)
+}
+
+/// Without the case itself and the reference there is nothing to say.
+fn needed(role: Role, ran: &Ran, case: &Path) -> Result<()> {
+    if ran.finished() || !matches!(role, Role::Default | Role::Reference) {
+        return Ok(());
+    }
+    let what = if role == Role::Default { "the case itself" } else { "the reference of the study" };
+    Err(Error::geometry(case.display().to_string(), format!("{what} does not come to its end: {}", ran.message)))
+}
+
+fn bar(count: usize, quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {elapsed} {msg}");
+    ProgressBar::new(count as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}

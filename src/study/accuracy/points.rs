@@ -1,0 +1,271 @@
+//! The points of a study: which case each of them is, where its results are, and how it is run or found again.
+
+use super::Options;
+use super::stopwatch::Stopwatch;
+use super::turns::{CHANCE, Flags, REFERENCE, Turn, chosen};
+use crate::backend::gpu;
+use crate::case::differences::differences;
+use crate::case::parse;
+use crate::case::read::{Loaded, read};
+use crate::case::steps::{Precision, Step};
+use crate::error::{Error, Result};
+use crate::output::checkpoint::{FOLDER, through_text};
+use crate::output::file;
+use crate::run::{self, CASE, Machine};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// What a run leaves beside its results.
+const RAN: &str = "point.json";
+/// Outputs that no point needs.
+const OUTPUTS: [&str; 4] =
+    ["output.pictures=false", "output.frames_at_deg=[]", "output.frames_per_step=0", "output.checkpoint_wall_s=null"];
+/// Checkpoints at the ends of load steps only, for the case itself.
+const STATES: &str = "output.checkpoint_wall_s=1e6";
+
+/// What a point is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// The case as it is.
+    Default,
+    /// The case again, with a chance of its own.
+    Chance,
+    Reference,
+    /// Shows that the reference has converged.
+    Check,
+    /// One knob turned.
+    Turned,
+}
+
+/// A point of the study.
+#[derive(Debug, Clone)]
+pub struct Point {
+    pub role: Role,
+    pub knob: &'static str,
+    pub label: &'static str,
+    flags: Flags,
+}
+
+impl Point {
+    /// Its folder among those of the points.
+    pub fn folder(&self) -> String {
+        let letters = self.label.chars().map(|c| match c {
+            'β' => 'b',
+            c if c.is_ascii_alphanumeric() || c == '.' => c.to_ascii_lowercase(),
+            _ => '-',
+        });
+        let name: String = letters.collect();
+        name.split('-').filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-")
+    }
+}
+
+/// How the run of a point went.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Ran {
+    /// `finished`, the cause of the guard that stopped it, or `impossible`.
+    pub ended: String,
+    /// What the guard said, or why the case is none.
+    pub message: String,
+    /// Options of `tricot run` behind the name of the case, besides those of the study.
+    pub flags: String,
+    /// Time without what the stopwatch took, s.
+    pub wall_s: f64,
+    /// That in steps of the stopwatch's scene, all of it and until the end of tightening.
+    pub work: f64,
+    pub tightening: f64,
+    /// Whether it started from the tightened state of the case.
+    pub from_state: bool,
+}
+
+/// A study being run.
+pub(super) struct Runner<'a> {
+    case: &'a Path,
+    sets: &'a [String],
+    options: &'a Options,
+    /// The case with all defaults.
+    default: Value,
+    /// Load steps before the first shear or move.
+    phases: usize,
+    stopwatch: Stopwatch,
+}
+
+impl<'a> Runner<'a> {
+    /// # Errors
+    /// A case that cannot be run.
+    pub(super) fn new(case: &'a Path, sets: &'a [String], options: &'a Options) -> Result<Self> {
+        let loaded = read(case, sets)?;
+        let loads = |step: &Step| matches!(step, Step::Shear { .. } | Step::Move { .. });
+        let phases = loaded.case.steps.iter().position(loads).unwrap_or(loaded.case.steps.len());
+        let stopwatch = Stopwatch::new(case, sets, options.threads)?;
+        Ok(Self { case, sets, options, default: value(&loaded)?, phases, stopwatch })
+    }
+
+    /// The points, in the order in which they are run: those that the others are compared with come first.
+    ///
+    /// # Errors
+    /// A choice of points that is none.
+    pub(super) fn points(&self) -> Result<Vec<Point>> {
+        let own = Point { role: Role::Default, knob: "default", label: "default", flags: Flags::default() };
+        let point = |role: Role, turn: &'static Turn| {
+            let flags = turn.flags(&self.default, self.phases)?;
+            Some(Point { role, knob: turn.knob, label: turn.label, flags })
+        };
+        let turned = chosen(&self.options.points)?.into_iter().filter_map(|turn| {
+            let role = if turn.knob == REFERENCE.knob { Role::Check } else { Role::Turned };
+            point(role, turn)
+        });
+        let device = self.options.machine != Machine::Cpu && gpu::devices().first().is_some_and(|d| d.is_discrete);
+        let on_gpu = device || self.options.machine == Machine::Gpu;
+        let differs = |p: &Point| {
+            let same_threads = p.flags.threads.is_some() && p.flags.threads == self.options.threads;
+            let same_machine = match p.flags.machine {
+                Some(Machine::Gpu) => true,
+                Some(_) => !on_gpu,
+                None => false,
+            };
+            !same_threads && !same_machine
+        };
+        let mut points = vec![own];
+        points.extend(CHANCE.iter().filter_map(|turn| point(Role::Chance, turn)));
+        points.extend(point(Role::Reference, &REFERENCE));
+        points.extend(turned.filter(differs));
+        Ok(points)
+    }
+
+    /// Title of the case.
+    pub(super) fn title(&self) -> String {
+        self.default["title"].as_str().unwrap_or_default().to_owned()
+    }
+
+    /// Folder of the results of a point.
+    pub(super) fn folder(&self, point: &Point) -> PathBuf {
+        self.options.output.join("points").join(point.folder())
+    }
+
+    /// Runs a point, or finds it run already; `None` if the user stopped it.
+    ///
+    /// # Errors
+    /// What keeps the whole study from going on, such as a full disk. A guard that stops the run is a result.
+    pub(super) fn perform(&mut self, point: &Point) -> Result<Option<Ran>> {
+        let outputs = OUTPUTS.map(String::from);
+        let mut sets = [self.sets, &point.flags.sets, &outputs].concat();
+        if point.role == Role::Default {
+            sets.push(STATES.into());
+        }
+        let loaded = match read(self.case, &sets) {
+            Err(error @ (Error::Case { .. } | Error::Geometry { .. })) => return Ok(Some(impossible(&error))),
+            loaded => loaded?,
+        };
+        let from = self.state(point, &loaded)?;
+        let flags = self.flags(point, from.as_deref());
+        let folder = self.folder(point);
+        if let Some(ran) = found(&folder, &loaded, &flags)? {
+            return Ok(Some(ran));
+        }
+        let f64_on_gpu = loaded.case.integration.precision == Precision::F64 && self.options.machine == Machine::Gpu;
+        let machine = point.flags.machine.unwrap_or(if f64_on_gpu { Machine::Cpu } else { self.options.machine });
+        let options = run::Options {
+            output: folder.clone(),
+            precision: None,
+            threads: point.flags.threads.or(self.options.threads),
+            machine,
+            adapter: String::new(),
+            force: true,
+            resume: false,
+            from: from.clone(),
+            quiet: true,
+        };
+        let tightened = if from.is_some() { 0 } else { self.phases * loaded.case.output.rows_per_step };
+        let (mut rows, mut tightening) = (0, 0.0);
+        let stopwatch = &mut self.stopwatch;
+        stopwatch.start();
+        let outcome = run::run_watched(&loaded, &options, &mut || {
+            rows += 1;
+            if rows != tightened {
+                return stopwatch.tick();
+            }
+            let spent = stopwatch.lap();
+            tightening = stopwatch.work();
+            spent
+        });
+        let [work, wall_s] = stopwatch.stop()?;
+        let (ended, message) = match outcome {
+            Ok(outcome) if outcome.interrupted => return Ok(None),
+            Ok(_) => ("finished".to_owned(), String::new()),
+            Err(Error::Guard(guard)) => (guard.cause.clone(), guard.to_string()),
+            Err(error @ Error::Geometry { .. }) => return Ok(Some(impossible(&error))),
+            Err(error) => return Err(error),
+        };
+        let ran = Ran { ended, message, flags, wall_s, work, tightening, from_state: from.is_some() };
+        file::replace(&folder.join(RAN), |w| serde_json::to_writer_pretty(w, &ran).map_err(Into::into))?;
+        Ok(Some(ran))
+    }
+
+    /// The state of the tightened case, for a point that only differs in what comes later.
+    fn state(&self, point: &Point, loaded: &Loaded) -> Result<Option<PathBuf>> {
+        let own_machine = point.flags.threads.is_some() || point.flags.machine.is_some();
+        if point.role != Role::Turned || own_machine || self.phases == 0 {
+            return Ok(None);
+        }
+        let case = value(loaded)?;
+        let later = |place: &str| run::may_differ(place, self.phases);
+        if !differences(&self.default, &case, &later).is_empty() {
+            return Ok(None);
+        }
+        let end = format!("-{}-{}.state", self.phases, loaded.case.steps[self.phases - 1].name());
+        let folder = self.options.output.join("points/default").join(FOLDER);
+        let entries = std::fs::read_dir(&folder).map_err(|e| Error::file(&folder, parse::reason(&e)))?;
+        let paths = entries.filter_map(|entry| entry.ok().map(|entry| entry.path()));
+        Ok(paths.into_iter().find(|path| path.to_string_lossy().ends_with(&end)))
+    }
+
+    /// Options of `tricot run` that reproduce a point, besides the overrides of the study.
+    fn flags(&self, point: &Point, from: Option<&Path>) -> String {
+        let Flags { sets, threads, machine } = &point.flags;
+        let sets = sets.iter().map(|set| format!("--set {set}"));
+        let threads = threads.map(|count| format!("--threads {count}"));
+        let machine = machine.map(|m| format!("--backend {}", if m == Machine::Gpu { "gpu" } else { "cpu" }));
+        let from =
+            from.and_then(Path::file_name).map(|name| format!("--from points/default/{FOLDER}/{}", name.display()));
+        sets.chain(threads).chain(machine).chain(from).collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// The results of a point from an earlier study of the same case.
+fn found(folder: &Path, loaded: &Loaded, flags: &str) -> Result<Option<Ran>> {
+    let (ran, case) = (folder.join(RAN), folder.join(CASE));
+    if !ran.is_file() || !case.is_file() {
+        return Ok(None);
+    }
+    let same = differences(&through_text(&value(loaded)?), &parse::file(&case)?, &|_| false).is_empty();
+    let ran: Option<Ran> = serde_json::from_value(parse::file(&ran)?).ok();
+    Ok(ran.filter(|ran| same && ran.flags == flags))
+}
+
+fn impossible(error: &Error) -> Ran {
+    Ran {
+        ended: "impossible".into(),
+        message: error.to_string(),
+        flags: String::new(),
+        wall_s: 0.0,
+        work: 0.0,
+        tightening: 0.0,
+        from_state: false,
+    }
+}
+
+fn value(loaded: &Loaded) -> Result<Value> {
+    serde_json::to_value(&loaded.case).map_err(|e| Error::case("case", e.to_string()))
+}
+
+impl Ran {
+    pub fn finished(&self) -> bool {
+        self.ended == "finished"
+    }
+
+    /// For programs.
+    pub(super) fn json(&self) -> Value {
+        json!({ "ended": self.ended, "message": self.message, "flags": self.flags, "wall_s": self.wall_s })
+    }
+}
