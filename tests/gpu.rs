@@ -3,7 +3,9 @@
 
 mod common;
 
-use common::{Random, advance, bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, with};
+use common::{
+    Random, advance, bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, reduced, with,
+};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -157,7 +159,7 @@ fn every_stage_agrees_with_the_cpu_on_every_buffer() {
     println!("{:?}", device.listed());
     let mut found = BTreeMap::new();
     let make = || Make { threads: 1, ..Make::default() };
-    for case in [coarse_cell(), held_specimen(), free()] {
+    for case in [coarse_cell(), held_specimen(), free(), reduced(coarse_cell()), reduced(free())] {
         let end = 2.5e-4f64.min(if case["domain"].get("mesh").is_none() { 1.0 } else { 1e-4 });
         let mut simulation = run::simulation(&loaded(&case), make()).unwrap();
         // a state in mid-run, then random ones

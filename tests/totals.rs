@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{advance, bare, below, block, charmetant, coarse_cell, loaded, neo_hookean, with};
+use common::{advance, bare, below, block, charmetant, coarse_cell, loaded, neo_hookean, reduced, with};
 use serde_json::{Value, json};
 use tricot::backend::Backend;
 use tricot::backend::cpu::{Cpu, Precision as Run};
@@ -129,6 +129,9 @@ fn check<R: Run>(case: &Value, until: f64, precision: Precision, rounding: f64) 
     for mode in 0..4 {
         compare("mode", places.modes.unwrap(), mode, lanes(&energies, ENERGY, mode));
     }
+    if let Some(sums) = places.hourglass {
+        compare("hourglass", sums, 0, get("hourglass energies"));
+    }
     let beams = get("beams");
     let axial =
         get("beam tension").iter().zip(beams.chunks_exact(TABLE)).map(|(n, b)| 0.5 * n * n / b[4] * b[3]).collect();
@@ -197,4 +200,5 @@ fn totals_of_a_periodic_cell_are_the_sums_of_its_buffers() {
 fn totals_of_a_free_scene_are_the_sums_of_its_buffers() {
     check::<f32>(&free(), 5e-5, Precision::F32, F32);
     check::<f64>(&free(), 5e-5, Precision::F64, F64);
+    check::<f64>(&reduced(free()), 5e-5, Precision::F64, F64);
 }

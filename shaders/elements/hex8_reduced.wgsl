@@ -19,10 +19,8 @@ const HOURGLASS: u32 = LANES;
 struct Deformation {
     // Mean displacement gradient in the fibre's frame.
     h: Tensor,
-    // k q by mode, along global axes.
-    forces: array<vec3<f32>, 4>,
-    // ½ Σ k |q|².
-    energy: f32,
+    // q by mode, along global axes.
+    modes: array<vec3<f32>, 4>,
 }
 
 // A number of the shape.
@@ -50,12 +48,9 @@ fn add_product_of(u: vec3<f32>, b: vec3<f32>, to: Tensor) -> Tensor {
     return Tensor(fma(u.xxx, b, to[0]), fma(u.yyy, b, to[1]), fma(u.zzz, b, to[2]));
 }
 
-// k q of a mode, from Σ h u.
-fn held(h: Hex, mode: u32, sum: vec3<f32>, mixed: Tensor, energy: ptr<function, f32>) -> vec3<f32> {
-    let q = sum - moment(h, mode) * mixed;
-    let force = entry(h, STIFFNESS + mode) * q;
-    *energy = *energy + dot(force, q);
-    return force;
+// q of a mode, from Σ h u.
+fn unseen(h: Hex, mode: u32, sum: vec3<f32>, mixed: Tensor) -> vec3<f32> {
+    return sum - moment(h, mode) * mixed;
 }
 
 fn deformation(h: Hex, q: Tensor) -> Deformation {
@@ -85,14 +80,13 @@ fn deformation(h: Hex, q: Tensor) -> Deformation {
     let d3 = u7 - u6;
     let low = d1 - u1;
     let high = d3 - d2;
-    var energy = 0.0;
-    let forces = array<vec3<f32>, 4>(
-        held(h, 0u, (u1 - (u2 + u3)) + ((u6 + u7) - (u4 + u5)), mixed, &energy),
-        held(h, 1u, (d2 + d3) - (u1 + d1), mixed, &energy),
-        held(h, 2u, low + high, mixed, &energy),
-        held(h, 3u, high - low, mixed, &energy),
+    let modes = array<vec3<f32>, 4>(
+        unseen(h, 0u, (u1 - (u2 + u3)) + ((u6 + u7) - (u4 + u5)), mixed),
+        unseen(h, 1u, (d2 + d3) - (u1 + d1), mixed),
+        unseen(h, 2u, low + high, mixed),
+        unseen(h, 3u, high - low, mixed),
     );
-    return Deformation(macroscopic(q) + mixed * transpose(q), forces, 0.5 * energy);
+    return Deformation(macroscopic(q) + mixed * transpose(q), modes);
 }
 
 #if force
@@ -110,14 +104,16 @@ fn force(number: u32) {
     let weighted = stress(material(h), state.h) * volume(h);
     // what is conjugate to the gradient: stress, less what the modes take from linear displacements
     var conjugate = weighted * q;
-    conjugate = add_product_of(-state.forces[0], moment(h, 0u), conjugate);
-    conjugate = add_product_of(-state.forces[1], moment(h, 1u), conjugate);
-    conjugate = add_product_of(-state.forces[2], moment(h, 2u), conjugate);
-    conjugate = add_product_of(-state.forces[3], moment(h, 3u), conjugate);
-    let g0 = state.forces[0];
-    let g1 = state.forces[1];
-    let plus = state.forces[2] + state.forces[3];
-    let minus = state.forces[3] - state.forces[2];
+    let g0 = entry(h, STIFFNESS) * state.modes[0];
+    let g1 = entry(h, STIFFNESS + 1u) * state.modes[1];
+    let g2 = entry(h, STIFFNESS + 2u) * state.modes[2];
+    let g3 = entry(h, STIFFNESS + 3u) * state.modes[3];
+    conjugate = add_product_of(-g0, moment(h, 0u), conjugate);
+    conjugate = add_product_of(-g1, moment(h, 1u), conjugate);
+    conjugate = add_product_of(-g2, moment(h, 2u), conjugate);
+    conjugate = add_product_of(-g3, moment(h, 3u), conjugate);
+    let plus = g2 + g3;
+    let minus = g3 - g2;
     let along0 = minus - g1;
     let along1 = -(minus + g1);
     let along2 = g1 - plus;
@@ -142,15 +138,20 @@ fn energy(number: u32) {
     let block = number / LANES;
     let lane = number % LANES;
     let h = hex(block, lane);
-    let state = deformation(h, frame(h));
+    var state = deformation(h, frame(h));
     let modes = energies(material(h), state.h) * volume(h);
+    var sum = 0.0;
+    for (var mode = 0u; mode < 4u; mode++) {
+        let q = state.modes[mode];
+        sum = fma(entry(h, STIFFNESS + mode), dot(q, q), sum);
+    }
     let at = ENERGY * block + lane;
     out[at] = modes.x;
     out[at + LANES] = modes.y;
     out[at + 2u * LANES] = modes.z;
     out[at + 3u * LANES] = modes.w;
     out[at + 4u * LANES] = jacobian(state.h);
-    out_hourglass[HOURGLASS * block + lane] = state.energy;
+    out_hourglass[HOURGLASS * block + lane] = 0.5 * sum;
 }
 #endif
 
@@ -161,36 +162,50 @@ fn sign_of(mode: u32, corner: u32) -> f32 {
     return vec4<f32>(s.y * s.z, s.x * s.z, s.x * s.y, s.x * s.y * s.z)[mode];
 }
 
+// Adds the rows of a stiffness that is bounded by k times the products of the sizes of its corners.
+fn add_rows(rows: ptr<function, array<f32, 8>>, k_total: f32, sizes: array<f32, 8>) {
+    var s = sizes;
+    for (var a = 0u; a < 8u; a++) {
+        (*rows)[a] = fma(k_total, s[a], (*rows)[a]);
+    }
+}
+
 fn bound(number: u32) {
     let block = number / LANES;
     let lane = number % LANES;
     let h = hex(block, lane);
     let state = deformation(h, frame(h));
-    // modulus × V |B_a| Σ|B|, across the fibre
     var rows = array<f32, 8>();
     var sizes = array<f32, 8>();
+    let p = material(h);
+    // modulus × V |B_a| Σ|B|, across the fibre
     var total = 0.0;
     for (var a = 0u; a < 8u; a++) {
         let b = slope(h, a);
         sizes[a] = sqrt(fma(b.z, b.z, b.y * b.y));
         total = total + sizes[a];
     }
-    let modulus = stiffness(material(h), state.h) * volume(h) * total;
+    add_rows(&rows, stiffness(p, state.h) * volume(h) * total, sizes);
+    // fibres are stiff along their mean, fibre lines heavy along each edge: what is between these directions is not
+    // covered, (d + e)² ≤ 2 d² + 2 e²
+    total = 0.0;
     for (var a = 0u; a < 8u; a++) {
-        rows[a] = modulus * sizes[a];
+        let b = abs(entry(h, 3u * a));
+        let lower = sign_of(1u, a) * state.modes[1] + sign_of(2u, a) * state.modes[2];
+        let apart = lower + sign_of(3u, a) * state.modes[3];
+        sizes[a] = b * b * sqrt(dot(apart, apart));
+        total = total + sizes[a];
     }
+    add_rows(&rows, 2.0 * along(p) * volume(h) * total, sizes);
     // k |γ_a| Σ|γ|
     for (var mode = 0u; mode < 4u; mode++) {
-        let from = moment(h, mode);
+        let sum = moment(h, mode);
         total = 0.0;
         for (var a = 0u; a < 8u; a++) {
-            sizes[a] = abs(sign_of(mode, a) - dot(from, slope(h, a)));
+            sizes[a] = abs(sign_of(mode, a) - dot(sum, slope(h, a)));
             total = total + sizes[a];
         }
-        let k = entry(h, STIFFNESS + mode) * total;
-        for (var a = 0u; a < 8u; a++) {
-            rows[a] = fma(k, sizes[a], rows[a]);
-        }
+        add_rows(&rows, entry(h, STIFFNESS + mode) * total, sizes);
     }
     let at = BOUND * block + lane;
     out[at] = rows[0];

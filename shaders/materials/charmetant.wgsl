@@ -134,3 +134,7 @@ fn stiffness(p: array<f32, PARAMETERS>, h: Tensor) -> f32 {
     let transverse = (tangent + 0.25 * p[K_DIST] + stressed) / smaller;
     return max(transverse, p[K_SH]);
 }
+
+fn along(p: array<f32, PARAMETERS>) -> f32 {
+    return p[K_ELONG];
+}

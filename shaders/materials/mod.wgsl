@@ -1,4 +1,4 @@
-// What constitutive laws share. A law has `stress`, `energies` (by mode; `energy` is an entry point) and `stiffness`.
+// What constitutive laws share. A law has `stress`, `energies` (by mode; `energy` is an entry point), `stiffness` and `along`.
 
 // A 3 × 3 tensor; element [i] is row i, so that `v * t` is the tensor times v.
 alias Tensor = mat3x3<f32>;

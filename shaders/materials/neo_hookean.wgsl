@@ -33,3 +33,7 @@ fn stiffness(p: array<f32, PARAMETERS>, h: Tensor) -> f32 {
     let j = max(jacobian(h), 0.05);
     return (p[LAMBDA] + p[MU] + p[MU]) / (j * j);
 }
+
+fn along(p: array<f32, PARAMETERS>) -> f32 {
+    return p[LAMBDA] + p[MU] + p[MU];
+}

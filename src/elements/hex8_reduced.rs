@@ -69,14 +69,14 @@ fn dot<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
 
 /// Σ_a h_αa u_a of each mode.
 #[inline(always)]
-fn modes<L: Lane>(u: &[L; 8]) -> [L; 4] {
-    let sums = [u[0] + u[1], u[2] + u[3], u[4] + u[5], u[6] + u[7]];
+fn sums<L: Lane>(u: &[L; 8]) -> [L; 4] {
+    let s = [u[0] + u[1], u[2] + u[3], u[4] + u[5], u[6] + u[7]];
     let d = [u[1] - u[0], u[3] - u[2], u[5] - u[4], u[7] - u[6]];
     let (low, high) = (d[1] - d[0], d[3] - d[2]);
-    [(sums[0] - sums[1]) + (sums[3] - sums[2]), (d[2] + d[3]) - (d[0] + d[1]), low + high, high - low]
+    [(s[0] - s[1]) + (s[3] - s[2]), (d[2] + d[3]) - (d[0] + d[1]), low + high, high - low]
 }
 
-/// The transpose of [`modes`]: Σ_α h_αa g_α of each corner.
+/// The transpose of [`sums`]: Σ_α h_αa g_α of each corner.
 #[inline(always)]
 fn spread<L: Lane>(g: [L; 4]) -> [L; 8] {
     let (plus, minus) = (g[2] + g[3], g[3] - g[2]);
@@ -97,10 +97,8 @@ fn spread<L: Lane>(g: [L; 4]) -> [L; 8] {
 struct Deformation<L> {
     /// Mean displacement gradient in the fibre's frame.
     h: Tensor<L>,
-    /// k q by mode and component, along global axes.
-    forces: [[L; 3]; 4],
-    /// ½ Σ k |q|².
-    energy: L,
+    /// q by mode and component, along global axes.
+    modes: [[L; 3]; 4],
 }
 
 #[inline(always)]
@@ -117,15 +115,12 @@ fn deformation<L: Lane>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize) -> D
             }
         }
     }
-    let seen = [modes(&u[0]), modes(&u[1]), modes(&u[2])];
-    let mut forces = [[zero; 3]; 4];
-    let mut energy = zero;
-    for mode in 0..4 {
-        let (moment, stiffness) = (moment(lanes, mode), lanes.shape(STIFFNESS + mode));
+    let seen = [sums(&u[0]), sums(&u[1]), sums(&u[2])];
+    let mut modes = [[zero; 3]; 4];
+    for (mode, q) in modes.iter_mut().enumerate() {
+        let moment = moment(lanes, mode);
         for i in 0..3 {
-            let q = seen[i][mode] - dot(&mixed[i], &moment);
-            forces[mode][i] = stiffness * q;
-            energy = forces[mode][i].fma(q, energy);
+            q[i] = seen[i][mode] - dot(&mixed[i], &moment);
         }
     }
     let q = lanes.frame(io);
@@ -137,7 +132,7 @@ fn deformation<L: Lane>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize) -> D
             }
         }
     }
-    Deformation { h, forces, energy: L::new(0.5) * energy }
+    Deformation { h, modes }
 }
 
 /// The twin of a kernel for a law, one lane an invocation.
@@ -173,7 +168,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
                     }
                     let mut held = [L::new(0.0); 4];
                     for mode in 0..4 {
-                        held[mode] = state.forces[mode][i];
+                        held[mode] = lanes.shape(STIFFNESS + mode) * state.modes[mode][i];
                         let moment = moment(&lanes, mode);
                         for j in 0..3 {
                             conjugate[j] = conjugate[j] - held[mode] * moment[j];
@@ -210,9 +205,21 @@ impl<M: Material> Kernel for Energy<M> {
                     (w * lanes.shape(VOLUME)).store(&mut out[mode * LANES + lane..]);
                 }
                 jacobian(&state.h).store(&mut out[4 * LANES + lane..]);
-                state.energy.store(&mut hourglass.item(0, item)[lane..]);
+                let mut sum = L::new(0.0);
+                for (mode, q) in state.modes.iter().enumerate() {
+                    sum = lanes.shape(STIFFNESS + mode).fma(dot(q, q), sum);
+                }
+                (L::new(0.5) * sum).store(&mut hourglass.item(0, item)[lane..]);
             }
         }
+    }
+}
+
+/// Adds the rows of a stiffness that is bounded by k times the products of the sizes of its corners.
+#[inline(always)]
+fn add_rows<L: Lane>(rows: &mut [L; 8], k_total: L, sizes: &[L; 8]) {
+    for (row, size) in rows.iter_mut().zip(sizes) {
+        *row = k_total.fma(*size, *row);
     }
 }
 
@@ -226,8 +233,9 @@ impl<M: Material> Kernel for Bound<M> {
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
                 let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
-                let h = deformation(io, &lanes, nodes as usize).h;
+                let Deformation { h, modes } = deformation(io, &lanes, nodes as usize);
                 let zero = L::new(0.0);
+                let mut rows = [zero; 8];
                 // modulus × V |B_a| Σ|B|, across the fibre
                 let (mut sizes, mut total) = ([zero; 8], zero);
                 for (corner, size) in sizes.iter_mut().enumerate() {
@@ -235,11 +243,26 @@ impl<M: Material> Kernel for Bound<M> {
                     *size = b[2].fma(b[2], b[1] * b[1]).sqrt();
                     total = total + *size;
                 }
-                let k = M::stiffness(&lanes.material(io), &h) * lanes.shape(VOLUME) * total;
-                let mut rows = [zero; 8];
-                for (row, size) in rows.iter_mut().zip(sizes) {
-                    *row = k * size;
+                let (material, volume) = (lanes.material(io), lanes.shape(VOLUME));
+                add_rows(&mut rows, M::stiffness(&material, &h) * volume * total, &sizes);
+                // fibres are stiff along their mean, fibre lines heavy along each edge: what is between these directions is not
+                // covered, (d + e)² ≤ 2 d² + 2 e²
+                let (mut sizes, mut total) = ([zero; 8], zero);
+                for (corner, size) in sizes.iter_mut().enumerate() {
+                    let along = lanes.shape(3 * corner).abs();
+                    let mut square = zero;
+                    for i in 0..3 {
+                        let mut apart = zero;
+                        for mode in 1..4 {
+                            // of the derivative along ξ: the sign of ξ itself does not matter
+                            apart = apart + L::new(MODES[mode][corner]) * modes[mode][i];
+                        }
+                        square = apart.fma(apart, square);
+                    }
+                    *size = along * along * square.sqrt();
+                    total = total + *size;
                 }
+                add_rows(&mut rows, L::new(2.0) * M::along(&material) * volume * total, &sizes);
                 // k |γ_a| Σ|γ|
                 for mode in 0..4 {
                     let moment = moment(&lanes, mode);
@@ -248,10 +271,7 @@ impl<M: Material> Kernel for Bound<M> {
                         *size = (L::new(MODES[mode][corner]) - dot(&moment, &slope(&lanes, corner))).abs();
                         total = total + *size;
                     }
-                    let k = lanes.shape(STIFFNESS + mode) * total;
-                    for (row, size) in rows.iter_mut().zip(sizes) {
-                        *row = k.fma(size, *row);
-                    }
+                    add_rows(&mut rows, lanes.shape(STIFFNESS + mode) * total, &sizes);
                 }
                 let out = out.item(0, item);
                 for (corner, &binary) in BINARY.iter().enumerate() {

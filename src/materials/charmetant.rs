@@ -163,4 +163,9 @@ impl Material for Charmetant {
         let transverse = (tangent + L::new(0.25) * p[K_DIST] + stressed) / smaller;
         transverse.max(p[K_SH])
     }
+
+    #[inline(always)]
+    fn along<L: Lane>(p: &[L; PARAMETERS]) -> L {
+        p[K_ELONG]
+    }
 }

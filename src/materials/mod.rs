@@ -24,6 +24,8 @@ pub trait Material: 'static {
     fn energy<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> [L; 4];
     /// Upper estimate of the tangent stiffness in every direction that fibre lines do not cover, MPa.
     fn stiffness<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> L;
+    /// Stiffness along the fibre at rest, MPa.
+    fn along<L: Lane>(parameters: &[L; PARAMETERS]) -> L;
 }
 
 /// The laws there are.

@@ -68,6 +68,11 @@ impl Material for NeoHookean {
         let j = jacobian(h).max(L::new(0.05));
         (p[LAMBDA] + p[MU] + p[MU]) / (j * j)
     }
+
+    #[inline(always)]
+    fn along<L: Lane>(p: &[L; PARAMETERS]) -> L {
+        p[LAMBDA] + p[MU] + p[MU]
+    }
 }
 
 /// The two other axes, in cyclic order.
