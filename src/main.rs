@@ -10,6 +10,7 @@ use tricot::error::{Error, Result};
 use tricot::output::directory;
 use tricot::run;
 use tricot::study::stability::stability;
+use tricot::study::step::step;
 
 const UNEXPECTED: u8 = 1;
 const BAD_INPUT: u8 = 2;
@@ -147,6 +148,17 @@ enum StudyCommand {
         #[arg(short, long, value_name = "FILE", default_value = "results/stability.csv")]
         output: PathBuf,
     },
+    /// Measure the limit of the time step on the way through a case, in f64, beside the estimate that a run follows.
+    Step {
+        #[command(flatten)]
+        case: CaseArguments,
+        /// Shear between two states, degrees; the end of every load step is one too
+        #[arg(long, value_name = "DEGREES", default_value_t = 15.0)]
+        every: f64,
+        /// Also try fixed steps at the end of the first load step, to find the longest that lasts
+        #[arg(long)]
+        confirm: bool,
+    },
 }
 
 #[derive(clap::Args)]
@@ -261,6 +273,10 @@ fn perform(command: Command) -> Result<Done> {
         }
         Command::Study { study: StudyCommand::Stability { folder, backend, output } } => {
             let study = stability(&folder, backend.into(), &output)?;
+            return Ok(Done { text: study.text, code: if study.held { 0 } else { UNEXPECTED } });
+        }
+        Command::Study { study: StudyCommand::Step { case, every, confirm } } => {
+            let study = step(&case.read()?, every, confirm)?;
             return Ok(Done { text: study.text, code: if study.held { 0 } else { UNEXPECTED } });
         }
         Command::Picture { source, field, width, output } => {

@@ -1,10 +1,18 @@
-// What constitutive laws share. A law has `stress`, `energies` (by mode; `energy` is an entry point) and `stiffness`.
+// What constitutive laws share. A law has `stress`, `energies` (by mode; `energy` is an entry point) and `moduli`.
 
 // A 3 × 3 tensor; element [i] is row i, so that `v * t` is the tensor times v.
 alias Tensor = mat3x3<f32>;
 
 // Numbers of a law in the material table.
 const PARAMETERS: u32 = 8u;
+
+// Upper estimates of tangent stiffness: of the section, in longitudinal shear, of the fibre, and of its tension.
+struct Moduli {
+    across: f32,
+    shear: f32,
+    along: f32,
+    tension: f32,
+}
 
 // Determinant of I + H.
 fn jacobian(h: Tensor) -> f32 {

@@ -53,6 +53,8 @@ pub struct Header {
 pub struct Params {
     /// Nodes in a plane of the position buffers.
     pub nodes: u32,
+    /// Factor on the axial stiffness of fibres across their lines, see [`crate::dynamics::time_step::left`]; 0 without lines.
+    pub left: f32,
 }
 
 /// Reads, in binding order.
@@ -79,7 +81,7 @@ type Derivatives<L> = [[[L; 4]; 3]; 3];
 pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
 /// Energies by mode and smallest Jacobian.
 pub struct Energy<M>(PhantomData<M>);
-/// Row sums of the stiffness that fibre lines do not cover.
+/// Row sums of the stiffness that fibre lines do not cover, see [`crate::dynamics::time_step`].
 pub struct Bound<M>(PhantomData<M>);
 
 /// A block and one register of its lanes.
@@ -359,19 +361,76 @@ impl<L: Lane, M: Material> Visitor<L> for Energies<L, M> {
     }
 }
 
-/// Sums the bound of each corner's stiffness: modulus × |∇N_a| × Σ|∇N|, across the fibre.
+/// Sums the bound of each corner's stiffness, modulus × |∂N_a| × Σ|∂N|: across the fibre, in longitudinal shear, of tension,
+/// and of the fibre as far as lines do not cover it.
 struct Bounds<L: Lane, M> {
     material: [L; PARAMETERS],
     rows: [L; 8],
+    /// Displacement of the high against the low corner of the four edges along ξ, by component.
+    edges: [[L; 4]; 3],
+    macroscopic: Tensor<L>,
+    /// See [`Params::left`].
+    left: f32,
     law: PhantomData<M>,
+}
+
+impl<L: Lane, M: Material> Bounds<L, M> {
+    /// Sizes of the derivatives along the fibre that lines do not cover. A line acts along its own edge, and a fibre at the
+    /// Gauss point may have another direction, where the four edges have turned away from each other.
+    #[inline(always)]
+    fn uncovered(&self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, along: &[L; 8]) -> [L; 8] {
+        let mut sizes = along.map(|slope| slope.abs());
+        if self.left == 0.0 {
+            return sizes;
+        }
+        let (one, half) = (L::new(1.0), L::new(0.5));
+        let fibre = [one + h[0][0], h[1][0], h[2][0]];
+        let row = |d: usize| [lanes.shape(point, 3 * d), lanes.shape(point, 3 * d + 1), lanes.shape(point, 3 * d + 2)];
+        let (first, rest) = (row(0), cross(&row(1), &row(2)));
+        let scale = one / dot(&first, &rest);
+        let rest = [rest[0] * scale, rest[1] * scale, rest[2] * scale];
+        for edge in 0..4 {
+            let mut now = rest;
+            for i in 0..3 {
+                let m = &self.macroscopic[i];
+                now[i] = rest[i] + m[2].fma(rest[2], m[1].fma(rest[1], m[0].fma(rest[0], self.edges[i][edge])));
+            }
+            let turned = cross(&now, &fibre);
+            let sine = (dot(&turned, &turned) / (dot(&now, &now) * dot(&fibre, &fibre))).sqrt();
+            let (low, high) = (along[2 * edge], along[2 * edge + 1]);
+            let size = sine.fma((half * (high - low)).abs(), (half * (high + low)).abs());
+            (sizes[2 * edge], sizes[2 * edge + 1]) = (size, size);
+        }
+        sizes
+    }
+}
+
+#[inline(always)]
+fn dot<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
+    a[2].fma(b[2], a[1].fma(b[1], a[0] * b[0]))
+}
+
+#[inline(always)]
+fn cross<L: Lane>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Sum of eight numbers, in order.
+#[inline(always)]
+fn total<L: Lane>(numbers: &[L; 8]) -> L {
+    let mut sum = numbers[0];
+    for number in &numbers[1..] {
+        sum = sum + *number;
+    }
+    sum
 }
 
 impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
     #[inline(always)]
     fn point(&mut self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, volume: L) {
-        let mut sizes = [L::new(0.0); 8];
-        let mut total = L::new(0.0);
-        for (a, size) in sizes.iter_mut().enumerate() {
+        let zero = L::new(0.0);
+        let mut slopes = [[zero; 8]; 3];
+        for a in 0..8 {
             let (mut n, mut sign) = ([L::new(FAR); 3], [L::new(-1.0); 3]);
             for k in 0..3 {
                 if a >> k & 1 == point >> k & 1 {
@@ -382,20 +441,31 @@ impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
                 }
             }
             let slope = [sign[0] * n[1] * n[2], sign[1] * n[0] * n[2], sign[2] * n[0] * n[1]];
-            let mut square = L::new(0.0);
-            for j in 1..3 {
-                let across = slope[2].fma(
+            for (j, slopes) in slopes.iter_mut().enumerate() {
+                slopes[a] = slope[2].fma(
                     lanes.shape(point, 6 + j),
                     slope[1].fma(lanes.shape(point, 3 + j), slope[0] * lanes.shape(point, j)),
                 );
-                square = across.fma(across, square);
             }
-            *size = square.sqrt();
-            total = total + *size;
         }
-        let k = M::stiffness(&self.material, h) * volume * total;
-        for (row, size) in self.rows.iter_mut().zip(sizes) {
-            *row = k.fma(size, *row);
+        let left = self.uncovered(lanes, point, h, &slopes[0]);
+        let slopes = slopes.map(|slopes| slopes.map(|slope| slope.abs()));
+        let mut across = slopes[1];
+        for (across, other) in across.iter_mut().zip(&slopes[2]) {
+            *across = other.fma(*other, *across * *across).sqrt();
+        }
+        let sums = [total(&slopes[0]), total(&slopes[1]), total(&slopes[2])];
+        let (sum_across, sum_left) = (total(&across), total(&left));
+        let m = M::moduli(&self.material, h);
+        let fibres = m.along * L::new(if self.left == 0.0 { 1.0 } else { f64::from(self.left) });
+        for a in 0..8 {
+            let [along, second, third] = [slopes[0][a], slopes[1][a], slopes[2][a]];
+            // motion of the corner across the fibre, and along it
+            let sideways = (m.across * across[a])
+                .fma(sum_across, along * (m.shear * (sums[0] + sum_across) + m.tension * sums[0]));
+            let lengthways = m.shear * across[a].fma(sums[0], second.fma(sums[1], third * sums[2]));
+            let row = (fibres * left[a]).fma(sum_left, sideways.max(lengthways));
+            self.rows[a] = row.fma(volume, self.rows[a]);
         }
     }
 }
@@ -405,7 +475,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { nodes } = io.params();
+        let Params { nodes, .. } = io.params();
         let mut slots = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
@@ -450,7 +520,7 @@ impl<M: Material> Kernel for Energy<M> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { nodes } = io.params();
+        let Params { nodes, .. } = io.params();
         let mut out = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
@@ -477,13 +547,21 @@ impl<M: Material> Kernel for Bound<M> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { nodes } = io.params();
+        let Params { nodes, left } = io.params();
         let mut out = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
                 let lanes = Lanes::<L>::new(io, item, lane);
-                let mut bounds =
-                    Bounds::<L, M> { material: lanes.material(io), rows: [L::new(0.0); 8], law: PhantomData };
+                let frame = lanes.frame(io);
+                let u = lanes.displacements(io, &frame, nodes as usize);
+                let mut bounds = Bounds::<L, M> {
+                    material: lanes.material(io),
+                    rows: [L::new(0.0); 8],
+                    edges: u.map(|u| [u[1] - u[0], u[3] - u[2], u[5] - u[4], u[7] - u[6]]),
+                    macroscopic: splat_tensor::<L>(&turn(&frame, &io.row.gradient, false)),
+                    left,
+                    law: PhantomData,
+                };
                 visit(io, &lanes, nodes as usize, &mut bounds);
                 let out = out.item(0, item);
                 for (corner, &binary) in BINARY.iter().enumerate() {

@@ -22,8 +22,20 @@ pub trait Material: 'static {
     fn stress<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> Tensor<L>;
     /// Strain energy per reference volume, MPa, by mode (elongation, compaction, distortion, longitudinal shear).
     fn energy<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> [L; 4];
-    /// Upper estimate of the tangent stiffness in every direction that fibre lines do not cover, MPa.
-    fn stiffness<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> L;
+    /// Upper estimates of the tangent stiffness.
+    fn moduli<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> Moduli<L>;
+}
+
+/// Upper estimates of tangent stiffness by what is strained, MPa of the reference volume.
+pub struct Moduli<L> {
+    /// The cross-section, per displacement gradient across the fibre of motion across it.
+    pub across: L,
+    /// Longitudinal shear: motion along the fibre that varies across it, and motion across it that varies along it.
+    pub shear: L,
+    /// The fibre.
+    pub along: L,
+    /// Tension of the fibre, which resists motion across it that varies along it.
+    pub tension: L,
 }
 
 /// The laws there are.

@@ -51,8 +51,6 @@ pub struct Model {
     pub hex_volume: Vec<f64>,
     /// Node, area or length, and whether it is a thread's, of each contact slave.
     pub slaves: Vec<Slave>,
-    /// Factor on 2/ω of the explicit stiffness that fibre lines leave: √(1 − 1/(4β)).
-    pub line_factor: f64,
     /// Largest share of the smallest contact radius or yarn thickness, mm, for guards.
     pub limits: Limits,
 }
@@ -80,6 +78,10 @@ pub struct Buffers {
     pub quanta: Buffer,
     pub remainder: Buffer,
     pub velocity: Buffer,
+    /// Of the last step, mm/s² and 1/tonne, and what fibre lines add to the first.
+    pub acceleration: Buffer,
+    pub inverse_mass: Buffer,
+    pub correction: Option<Buffer>,
     pub status: Buffer,
     pub hex_energy: Option<Buffer>,
     pub beam_tension: Option<Buffer>,
@@ -220,10 +222,11 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let hex_bound = b.scratch("hex stiffness bounds", hex8::BOUND * hexes);
     let hex_energy = (hexes > 0).then(|| b.scratch("hex energies", hex8::ENERGY * hexes));
     let hex_virial = (hexes > 0 && periodic).then(|| b.scratch("hex stress sums", hex8::VIRIAL * hexes));
+    let left = effects.fibre_lines.as_ref().map_or(0.0, |lines| time_step::left(lines.beta) as f32);
     let hex_reads = [headers, corners, quanta_, remainder, shapes, frames, materials];
     for (law, range) in &solids.laws {
         let stages = HexStages {
-            params: hex8::Params { nodes: nodes as u32 },
+            params: hex8::Params { nodes: nodes as u32, left },
             blocks: range.clone(),
             reads: &hex_reads,
             force: hex_force,
@@ -255,11 +258,11 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         });
     }
     let bend_energy = (bends > 0).then(|| b.scratch("bend energies", bends));
+    let bend_table = b.table("bends", threads.bends.clone());
     let bend_virial = (bends > 0 && periodic).then(|| b.scratch("bend stress sums", 9 * bends));
     if let Some(energy) = bend_energy {
         let pairs = b.indices("bend beams", threads.pairs.clone());
-        let table = b.table("bends", threads.bends.clone());
-        let reads = [pairs, table, ends, beam_table, quanta_, remainder];
+        let reads = [pairs, bend_table, ends, beam_table, quanta_, remainder];
         let writes = [(bend_force, own(1, 6)), (energy, own(1, 1))];
         b.plan.step.push(match bend_virial {
             Some(virial) => {
@@ -367,13 +370,11 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let line_stiffness = [&solids.line_stiffness[..], &threads.line_stiffness].concat();
     let mut covered = vec![false; nodes];
     let mut correction = None;
-    let mut line_factor = 1.0;
     if let Some(lines) = &effects.fibre_lines {
         let groups = line_groups(mesh, lines.threads);
         for g in &groups {
             covered[g.first as usize..][..(g.lines * g.stations) as usize].fill(true);
         }
-        line_factor = libm::sqrt((1.0 - 0.25 / lines.beta).max(0.01));
         let response = b.scratch("line correction", 3 * nodes);
         correction = Some(response);
         let table = b.indices("fibre lines", bytemuck::cast_slice(&groups).to_vec());
@@ -412,13 +413,26 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     });
 
     // limit of the time step
-    let constant = constant_stiffness(mesh, &threads, &line_stiffness, &covered);
+    if effects.fibre_lines.is_none() {
+        // in the bounds of hexahedra
+        covered[..first].fill(true);
+    }
+    let constant = constant_stiffness(mesh, &line_stiffness, &covered);
     let constant = b.table("constant stiffness of nodes", constant);
     let solid_bounds = b.indices("corner bounds of solid nodes", solids.bounds.clone());
-    let reads = [solid_bounds, hex_bound, constant, mass];
+    let bend_rows = b.table("bend rows", threads.bend_rows.clone());
+    // without bends none of their numbers is read
+    let bend_reads = [bend_table, bend_energy.unwrap_or(bend_force), bend_force, bend_rows];
+    let reads =
+        [&[solid_bounds, hex_bound, constant, mass, thread_slots, beam_force, beam_table][..], &bend_reads].concat();
     let params = time_step::Params { first_thread };
     let writes = [(element_limit, own(2, 1))];
     b.plan.diagnose.push(after::<time_step::ElementLimit>("element limit", nodes, NODE_GRAIN, &reads, &writes, params));
+    if let Some((at, count)) = condition_nodes {
+        let writes = [(element_limit, Access::Scatter)];
+        let held = after::<time_step::HeldLimit>("held limit", count, NODE_GRAIN, &[at], &writes, [0u32; 0]);
+        b.plan.diagnose.push(held);
+    }
 
     let (faces, pairs) = contact.as_ref().map_or((None, None), |c| (c.faces, c.pairs));
     let sources = totals::Sources {
@@ -462,6 +476,9 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             quanta: quanta_,
             remainder,
             velocity,
+            acceleration,
+            inverse_mass,
+            correction,
             status: status_,
             hex_energy,
             beam_tension,
@@ -486,7 +503,6 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         hex_place: solids.place,
         hex_volume: solids.volume,
         slaves: contact.map_or_else(Vec::new, |c| c.slaves),
-        line_factor,
         limits: Limits { thread_radius: radius, yarn_thickness: thickness },
     })
 }
@@ -794,11 +810,9 @@ fn line_groups(mesh: &Mesh, with_threads: bool) -> Vec<fibre_lines::Group> {
     groups
 }
 
-/// Row sums of stiffness that do not change: bending of threads, and axial stiffness where fibre lines do not cover it.
-fn constant_stiffness(mesh: &Mesh, threads: &Threads, axial: &[f64], covered: &[bool]) -> Vec<f64> {
-    let first = mesh.first_thread_node();
+/// Row sums of axial stiffness that is not covered otherwise.
+fn constant_stiffness(mesh: &Mesh, axial: &[f64], covered: &[bool]) -> Vec<f64> {
     let mut k = vec![0.0; mesh.nodes.len()];
-    k[first..].copy_from_slice(&threads.bending_stiffness);
     let blocks = mesh
         .blocks
         .iter()
