@@ -13,6 +13,7 @@ use tricot::study::accuracy::{self, accuracy};
 use tricot::study::compare::compare;
 use tricot::study::effects::{self, effects};
 use tricot::study::stability::stability;
+use tricot::study::step::step;
 
 const UNEXPECTED: u8 = 1;
 const BAD_INPUT: u8 = 2;
@@ -211,6 +212,17 @@ enum StudyCommand {
         #[arg(long)]
         force: bool,
     },
+    /// Measure the limit of the time step on the way through a case, in f64, beside the estimate that a run follows.
+    Step {
+        #[command(flatten)]
+        case: CaseArguments,
+        /// Shear between two states, degrees; the end of every load step is one too
+        #[arg(long, value_name = "DEGREES", default_value_t = 15.0)]
+        every: f64,
+        /// Also try fixed steps at the end of the first load step, to find the longest that lasts
+        #[arg(long)]
+        confirm: bool,
+    },
 }
 
 #[derive(clap::Args)]
@@ -346,6 +358,10 @@ fn perform(command: Command) -> Result<Done> {
             let make = run::make(precision, backend.into(), threads.map(usize::from), "")?;
             let study = effects(&loaded, &effects::Options { make, only, table, force })?;
             return Ok(Done { text: study.text, code: if study.interrupted { INTERRUPTED } else { 0 } });
+        }
+        Command::Study { study: StudyCommand::Step { case, every, confirm } } => {
+            let study = step(&case.read()?, every, confirm)?;
+            return Ok(Done { text: study.text, code: if study.held { 0 } else { UNEXPECTED } });
         }
         Command::Picture { source, field, width, output } => {
             let out = output.unwrap_or_else(|| picture_path(&source));

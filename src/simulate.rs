@@ -6,10 +6,12 @@
 
 mod guards;
 mod ledger;
+mod limit;
 mod snapshot;
 mod state;
 
 pub use ledger::Energies;
+pub use limit::Limit;
 
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
@@ -436,7 +438,7 @@ impl Simulation {
         self.alive()?;
         let (worst, node) = places.stiffness.of(&totals);
         let contact = f64::from(f32::from_bits(status[status::CONTACT_RATE]));
-        self.health.dt_limit = time_step::limit(worst + contact) * self.model.line_factor;
+        self.health.dt_limit = time_step::limit(worst + contact);
         self.health.limiting_node = node;
         (self.health.min_jacobian, self.health.worst_hex) = places.jacobian.map_or((1.0, 0), |largest| {
             let (negative, place) = largest.of(&totals);

@@ -19,7 +19,9 @@ fn scene(blocks: Value) -> Value {
 }
 
 /// Both hexahedra, and how a case gets them.
-const HEXAHEDRA: [(&str, fn(Value) -> Value); 2] = [("full", |case| case), ("reduced", reduced)];
+/// A kind of hexahedra, and how a case asks for it.
+type Hexahedra = (&'static str, fn(Value) -> Value);
+const HEXAHEDRA: [Hexahedra; 2] = [("full", |case| case), ("reduced", reduced)];
 
 /// Forces on all nodes, from the velocities after one short step from rest.
 fn forces(simulation: &mut Simulation) -> Vec<[f64; 3]> {

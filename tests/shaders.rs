@@ -98,7 +98,7 @@ macro_rules! fields {
 /// The parameters of each file of kernels, as Rust lays them out.
 fn parameters(file: &str) -> Vec<Field<&'static str>> {
     match file {
-        "elements/hex8" | "elements/hex8_reduced" => fields!(elements::block::Params: nodes),
+        "elements/hex8" | "elements/hex8_reduced" => fields!(elements::block::Params: nodes, left),
         "contact/grid" | "contact/candidates" | "contact/penalty" | "contact/threads" | "contact/tie" => fields!(
             contact::Params: period, cells, capacity, slots, beam_slots, slabs, origin, cell, skin, friction, tangential, damping,
             force_quantum, stiffness_quantum, thread_radius, thread_thread, self_arc, depth, state

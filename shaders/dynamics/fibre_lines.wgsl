@@ -33,15 +33,16 @@ var<workgroup> stations: array<vec4<f32>, STATIONS>;
 // Diagonal, coupling to the next row of the same subsystem, right side, and coupling to the last row.
 var<workgroup> rows: array<vec4<f32>, STATIONS>;
 
-// Current direction of the segment between two nodes.
-fn direction(here: u32, next: u32, shift: vec2<i32>) -> vec3<f32> {
+// Current direction of the segment between two nodes, and its stiffness.
+fn segment(here: u32, next: u32, shift: vec2<i32>) -> vec4<f32> {
     let rest = lattice_between(next, here, shift);
 #if PERIODIC
     let v = rest + apply(gradient(), rest) + displacement_between(next, here);
 #else
     let v = rest + displacement_between(next, here);
 #endif
-    return v * (1.0 / norm(v));
+    let shortened = max(dot(rest, rest) / dot(v, v), 1.0);
+    return vec4<f32>(v * (1.0 / norm(v)), stiffness[here] * shortened * shortened);
 }
 
 fn acceleration_at(node: u32) -> vec3<f32> {
@@ -75,16 +76,17 @@ fn fibre_lines(number: u32, local: u32) {
 
     for (var i = local; i < n; i += WORKGROUP) {
         let here = first + i;
-        var d = vec3<f32>();
+        var s = vec4<f32>();
         if stiffness[here] > 0.0 && i < last {
-            d = direction(here, here + 1u, vec2<i32>());
+            s = segment(here, here + 1u, vec2<i32>());
         }
 #if PERIODIC
         if stiffness[here] > 0.0 && i == last && closed {
-            d = direction(here, first, wrap);
+            s = segment(here, first, wrap);
         }
 #endif
-        stations[i] = vec4<f32>(d, inverse_mass[here]);
+        stations[i] = vec4<f32>(s.xyz, inverse_mass[here]);
+        rows[i].x = s.w;
     }
     workgroupBarrier();
 
@@ -95,7 +97,7 @@ fn fibre_lines(number: u32, local: u32) {
         let d = stations[i].xyz;
         var diagonal = 1.0;
         if any(d != vec3<f32>()) {
-            diagonal = compliance / stiffness[first + i] + stations[i].w + stations[next].w;
+            diagonal = compliance / rows[i].x + stations[i].w + stations[next].w;
         }
         let right = -dot(d, acceleration_at(first + next) - acceleration_at(first + i));
         var along = coupling(i, next);

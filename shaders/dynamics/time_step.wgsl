@@ -3,6 +3,7 @@
 #include "dynamics/assemble"
 
 #if ROOT
+#if element_limit
 struct Params {
     first_thread: u32,
 }
@@ -13,7 +14,43 @@ struct Params {
 @group(1) @binding(1) var<storage, read> hex_bound: array<f32>;
 @group(1) @binding(2) var<storage, read> constant: array<f32>;
 @group(1) @binding(3) var<storage, read> mass: array<f32>;
-@group(1) @binding(4) var<storage, read_write> limit: array<f32>;
+@group(1) @binding(4) var<storage, read> thread_slots: array<u32>;
+@group(1) @binding(5) var<storage, read> beam_force: array<f32>;
+@group(1) @binding(6) var<storage, read> beams: array<f32>;
+#if BENDING
+@group(1) @binding(7) var<storage, read> bend_slots: array<u32>;
+@group(1) @binding(8) var<storage, read> bends: array<f32>;
+@group(1) @binding(9) var<storage, read> bend_energy: array<f32>;
+@group(1) @binding(10) var<storage, read> bend_force: array<f32>;
+@group(1) @binding(11) var<storage, read> bend_rows: array<f32>;
+@group(1) @binding(12) var<storage, read_write> limit: array<f32>;
+#else
+@group(1) @binding(7) var<storage, read_write> limit: array<f32>;
+#endif
+
+// Numbers of a beam in the table; its length at rest is the fourth.
+const TABLE: u32 = 5u;
+#if BENDING
+// Numbers of a bend's row sums.
+const ROWS: u32 = 4u;
+// Difference of T and T₀ below which they count as equal.
+const AT_REST: f32 = 1e-3;
+
+// How much stiffer a bend is than a straight one.
+fn stiffening(bend: u32) -> f32 {
+    let stiffness = bends[2u * bend];
+    let rest = bends[2u * bend + 1u];
+    let force = length(vec3<f32>(bend_force[6u * bend], bend_force[6u * bend + 1u], bend_force[6u * bend + 2u]));
+    let away = sqrt(bend_energy[bend] / stiffness);
+    var t = rest;
+    if away >= AT_REST {
+        t = sqrt(max(force * bend_rows[ROWS * bend + 3u] / (stiffness * away) - 1.0, 0.0));
+    }
+    let square = 1.0 + t * t;
+    let further = select(0.0, away, t > rest);
+    return square * (square + (t + t) * further);
+}
+#endif
 
 // Assembles the row sums of element stiffness.
 fn element_limit(node: u32) {
@@ -25,8 +62,38 @@ fn element_limit(node: u32) {
                 k = k + hex_bound[slot];
             }
         }
+    } else {
+        let item = node - params.first_thread;
+        for (var i = 0u; i < THREAD; i++) {
+            let slot = thread_slots[THREAD * item + i];
+            if slot != NONE {
+                let force = vec3<f32>(beam_force[3u * slot], beam_force[3u * slot + 1u], beam_force[3u * slot + 2u]);
+                k = k + 2.0 * length(force) / beams[TABLE * slot + 3u];
+            }
+        }
+#if BENDING
+        for (var i = 0u; i < BENT; i++) {
+            let slot = bend_slots[BENT * item + i];
+            if slot != NONE {
+                k = k + bend_rows[ROWS * slot + i] * stiffening(slot);
+            }
+        }
+#endif
     }
     limit[node] = k;
     limit[node + arrayLength(&mass)] = k / mass[node];
 }
+#endif
+
+#if held_limit
+@group(1) @binding(0) var<storage, read> conditions: array<u32>;
+@group(1) @binding(1) var<storage, read_write> limit: array<f32>;
+
+// Leaves out nodes that are held altogether.
+fn held_limit(item: u32) {
+    if conditions[2u * item + 1u] == 7u {
+        limit[arrayLength(&limit) / 2u + conditions[2u * item]] = 0.0;
+    }
+}
+#endif
 #endif

@@ -15,6 +15,8 @@ const BOUND: u32 = 8u * LANES;
 struct Params {
     // Nodes in a plane of the position buffers.
     nodes: u32,
+    // Factor on the axial stiffness of fibres across their lines; 0 without lines.
+    left: f32,
 }
 
 @group(2) @binding(1) var<uniform> params: Params;

@@ -189,8 +189,8 @@ fn energy(number: u32) {
 #endif
 
 #if bound
-// Size of the derivatives of the shape function of a binary corner across the fibre, at a Gauss point.
-fn slope_across(h: Hex, point: u32, corner: u32) -> f32 {
+// Derivatives of the shape function of a binary corner in the fibre's frame, at a Gauss point.
+fn slope_at(h: Hex, point: u32, corner: u32) -> vec3<f32> {
     let bits = vec3<u32>(0u, 1u, 2u);
     let high = (vec3<u32>(corner) >> bits) & vec3<u32>(1u);
     let own = high == ((vec3<u32>(point) >> bits) & vec3<u32>(1u));
@@ -198,8 +198,28 @@ fn slope_across(h: Hex, point: u32, corner: u32) -> f32 {
     let sign = select(vec3<f32>(-1.0), vec3<f32>(1.0), high == vec3<u32>(1u));
     let slope = sign * n.yxx * n.zzy;
     let lower = fma(slope.yyy, inverse(h, point, 1u), slope.x * inverse(h, point, 0u));
-    let across = fma(slope.zzz, inverse(h, point, 2u), lower);
-    return sqrt(across.y * across.y + across.z * across.z);
+    return fma(slope.zzz, inverse(h, point, 2u), lower);
+}
+
+// Displacement of the high against the low corner of the four edges along ξ.
+fn edges(h: Hex, q: Tensor) -> array<vec3<f32>, 4> {
+    let node = corners[h.corners];
+    let at = node_quanta(node);
+    let rest = node_remainder(node);
+    // binary order
+    return array<vec3<f32>, 4>(
+        local_displacement(h, 1u, at, rest, q),
+        local_displacement(h, 2u, at, rest, q) - local_displacement(h, 3u, at, rest, q),
+        local_displacement(h, 5u, at, rest, q) - local_displacement(h, 4u, at, rest, q),
+        local_displacement(h, 6u, at, rest, q) - local_displacement(h, 7u, at, rest, q),
+    );
+}
+
+// Sine of the angle between a fibre at a Gauss point and an edge, from the edge at rest and its change.
+fn sine_between(rest: vec3<f32>, change: vec3<f32>, fibre: vec3<f32>, add: Tensor) -> f32 {
+    let now = rest + vec3<f32>(dot(add[0], rest), dot(add[1], rest), dot(add[2], rest)) + change;
+    let turned = cross(now, fibre);
+    return sqrt(dot(turned, turned) / (dot(now, now) * dot(fibre, fibre)));
 }
 
 fn bound(number: u32) {
@@ -210,17 +230,42 @@ fn bound(number: u32) {
     let p = material(h);
     let add = macroscopic(q);
     var d = derivatives(h, q);
+    var changes = edges(h, q);
+    let explicit_fibres = params.left == 0.0;
+    let factor = select(params.left, 1.0, explicit_fibres);
     var rows = array<f32, 8>();
     for (var point = 0u; point < 8u; point++) {
-        var sizes = array<f32, 8>();
-        var total = 0.0;
-        for (var a = 0u; a < 8u; a++) {
-            sizes[a] = slope_across(h, point, a);
-            total = total + sizes[a];
+        let here = gradient_at(h, point, &d, add);
+        let fibre = vec3<f32>(1.0 + here[0].x, here[1].x, here[2].x);
+        let side = cross(inverse(h, point, 1u), inverse(h, point, 2u));
+        let rest = side / dot(inverse(h, point, 0u), side);
+        var slopes = array<vec3<f32>, 8>();
+        var left = array<f32, 8>();
+        var sum = vec3<f32>();
+        var sum_across = 0.0;
+        var sum_left = 0.0;
+        for (var edge = 0u; edge < 4u; edge++) {
+            let low = slope_at(h, point, 2u * edge);
+            let high = slope_at(h, point, 2u * edge + 1u);
+            var sizes = abs(vec2<f32>(low.x, high.x));
+            if !explicit_fibres {
+                let sine = sine_between(rest, changes[edge], fibre, add);
+                sizes = vec2<f32>(fma(sine, abs(0.5 * (high.x - low.x)), abs(0.5 * (high.x + low.x))));
+            }
+            slopes[2u * edge] = abs(low);
+            slopes[2u * edge + 1u] = abs(high);
+            left[2u * edge] = sizes.x;
+            left[2u * edge + 1u] = sizes.y;
+            sum = sum + abs(low) + abs(high);
+            sum_across = sum_across + length(low.yz) + length(high.yz);
+            sum_left = sum_left + sizes.x + sizes.y;
         }
-        let k = stiffness(p, gradient_at(h, point, &d, add)) * volume(h, point) * total;
+        let m = moduli(p, here);
+        let volume_here = volume(h, point);
         for (var a = 0u; a < 8u; a++) {
-            rows[a] = fma(k, sizes[a], rows[a]);
+            let others = moduli_rows(m, slopes[a], length(slopes[a].yz), sum, sum_across);
+            let row = fma(factor * m.along * left[a], sum_left, others);
+            rows[a] = fma(row, volume_here, rows[a]);
         }
     }
     let at = BOUND * block + lane;

@@ -178,25 +178,36 @@ fn bound(number: u32) {
     var rows = array<f32, 8>();
     var sizes = array<f32, 8>();
     let p = material(h);
-    // modulus × V |B_a| Σ|B|, across the fibre
+    // modulus × V |B_a| Σ|B|
+    let m = moduli(p, state.h);
+    let here = volume(h);
     var total = 0.0;
+    var sum_slopes = vec3<f32>();
     for (var a = 0u; a < 8u; a++) {
         let b = slope(h, a);
-        sizes[a] = sqrt(fma(b.z, b.z, b.y * b.y));
-        total = total + sizes[a];
+        total = total + length(b.yz);
+        sum_slopes = sum_slopes + abs(b);
     }
-    add_rows(&rows, stiffness(p, state.h) * volume(h) * total, sizes);
-    // fibres are stiff along their mean, fibre lines heavy along each edge: what is between these directions is not
-    // covered, (d + e)² ≤ 2 d² + 2 e²
-    total = 0.0;
     for (var a = 0u; a < 8u; a++) {
-        let b = abs(entry(h, 3u * a));
-        let lower = sign_of(1u, a) * state.modes[1] + sign_of(2u, a) * state.modes[2];
-        let apart = lower + sign_of(3u, a) * state.modes[3];
-        sizes[a] = b * b * sqrt(dot(apart, apart));
-        total = total + sizes[a];
+        let b = slope(h, a);
+        rows[a] = here * moduli_rows(m, abs(b), length(b.yz), sum_slopes, total);
+        sizes[a] = abs(b.x);
     }
-    add_rows(&rows, 2.0 * along(p) * volume(h) * total, sizes);
+    if params.left == 0.0 {
+        add_rows(&rows, m.along * here * sum_slopes.x, sizes);
+    } else {
+        // fibres are stiff along their mean, fibre lines heavy along each edge: what is between these directions is not
+        // covered, (d + e)² ≤ 2 d² + 2 e²
+        total = 0.0;
+        for (var a = 0u; a < 8u; a++) {
+            let b = abs(entry(h, 3u * a));
+            let lower = sign_of(1u, a) * state.modes[1] + sign_of(2u, a) * state.modes[2];
+            let apart = lower + sign_of(3u, a) * state.modes[3];
+            sizes[a] = b * b * sqrt(dot(apart, apart));
+            total = total + sizes[a];
+        }
+        add_rows(&rows, 2.0 * m.along * here * total, sizes);
+    }
     // k |γ_a| Σ|γ|
     for (var mode = 0u; mode < 4u; mode++) {
         let sum = moment(h, mode);

@@ -121,7 +121,7 @@ fn energies(p: array<f32, PARAMETERS>, h: Tensor) -> vec4<f32> {
     );
 }
 
-fn stiffness(p: array<f32, PARAMETERS>, h: Tensor) -> f32 {
+fn moduli(p: array<f32, PARAMETERS>, h: Tensor) -> Moduli {
     let s = state(h);
     let size = max(max(abs(s.i_comp), p[CAP]), 1e-6);
     let power = exp((p[P_COMP] - 1.0) * ln(size));
@@ -131,10 +131,10 @@ fn stiffness(p: array<f32, PARAMETERS>, h: Tensor) -> f32 {
     let mean = 1.0 + 0.5 * (s.b22 + s.b33);
     let difference = sqrt(fma(s.dv, s.dv, s.b23 * s.b23));
     let smaller = max(mean - difference, 0.01);
-    let transverse = (tangent + 0.25 * p[K_DIST] + stressed) / smaller;
-    return max(transverse, p[K_SH]);
-}
-
-fn along(p: array<f32, PARAMETERS>) -> f32 {
-    return p[K_ELONG];
+    let across = (tangent + 0.25 * p[K_DIST] + stressed) / smaller;
+    let g_g = fma(s.g2, s.g2, s.g3 * s.g3);
+    let widest = (mean + difference + g_g * s.inv_c) * s.inv_c;
+    let shear = p[K_SH] * s.inv_c * (max(1.0, widest) + sqrt(g_g) * s.inv_c);
+    let along = p[K_ELONG] * max(1.0 - s.i_elong, 0.0) * s.inv_c;
+    return Moduli(across, shear, along, max(p[K_ELONG] * s.i_elong * s.inv_c, 0.0));
 }

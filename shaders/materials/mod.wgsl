@@ -1,10 +1,28 @@
-// What constitutive laws share. A law has `stress`, `energies` (by mode; `energy` is an entry point), `stiffness` and `along`.
+// What constitutive laws share. A law has `stress`, `energies` (by mode; `energy` is an entry point) and `moduli`.
 
 // A 3 × 3 tensor; element [i] is row i, so that `v * t` is the tensor times v.
 alias Tensor = mat3x3<f32>;
 
 // Numbers of a law in the material table.
 const PARAMETERS: u32 = 8u;
+
+// Upper estimates of tangent stiffness: of the section, in longitudinal shear, of the fibre, and of its tension.
+struct Moduli {
+    across: f32,
+    shear: f32,
+    along: f32,
+    tension: f32,
+}
+
+// Row sum of a corner's stiffness per volume, less that of the fibre: from the sizes of the derivatives of its shape function
+// along each axis and across the fibre, and their sums over all corners.
+fn moduli_rows(m: Moduli, slope: vec3<f32>, across: f32, sum: vec3<f32>, sum_across: f32) -> f32 {
+    // motion of the corner across the fibre, and along it
+    let along = slope.x * (m.shear * (sum.x + sum_across) + m.tension * sum.x);
+    let sideways = fma(m.across * across, sum_across, along);
+    let lengthways = m.shear * fma(across, sum.x, fma(slope.y, sum.y, slope.z * sum.z));
+    return max(sideways, lengthways);
+}
 
 // Determinant of I + H.
 fn jacobian(h: Tensor) -> f32 {

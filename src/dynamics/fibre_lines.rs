@@ -8,6 +8,9 @@
 //!
 //! diagonal 1/(β dt² k_s) + 1/m_s + 1/m_{s+1}, off-diagonal −d_s·d_{s+1}/m_{s+1}, right side −d_s·(a_{s+1} − a_s).
 //!
+//! The laws of fibres are logarithmic: at a stretch λ < 1 their stiffness is (1 − ln λ)/λ² times that at rest, and k_s grows by
+//! λ⁻⁴, which is more than that.
+//!
 //! The sweep runs along a group of up to sixteen lines at once, one line a lane. The WGSL twin gives each line a workgroup and
 //! solves the same system, bordered by its last row, by parallel cyclic reduction.
 
@@ -48,7 +51,7 @@ pub struct Params {
 }
 
 pub const GROUPS: usize = 0;
-/// Axial stiffness of the segment that starts at a node, N/mm; 0 for none.
+/// Axial stiffness at rest of the segment that starts at a node, N/mm; 0 for none.
 pub const STIFFNESS: usize = 1;
 pub const REFERENCE: usize = 2;
 pub const QUANTA: usize = 3;
@@ -129,19 +132,23 @@ fn gather<L: Lane, const PERIODIC: bool>(io: &Io<L::Scalar>, group: &Group, scra
                 let d = reference[next + k * plane].wrapping_sub(reference[here + k * plane]).wrapping_add(shift[k]);
                 L::Scalar::from_i32(d) * quantum
             });
+            let mut lengths = [L::Scalar::from_f64(0.0); 2];
             for k in 0..3 {
                 let (a, b) = (next + k * plane, here + k * plane);
                 let w =
                     L::Scalar::from_i32(quanta[a].wrapping_sub(quanta[b])) * quantum + (remainder[a] - remainder[b]);
-                let mut d = rest[k];
+                let mut now = rest[k];
                 if PERIODIC {
-                    d = d + (g[k][0] * rest[0] + g[k][1] * rest[1] + g[k][2] * rest[2]);
+                    now = now + (g[k][0] * rest[0] + g[k][1] * rest[1] + g[k][2] * rest[2]);
                 }
-                scratch[place(i, DIRECTION + k) + lane] = d + w;
+                now = now + w;
+                lengths = [lengths[0] + rest[k] * rest[k], lengths[1] + now * now];
+                scratch[place(i, DIRECTION + k) + lane] = now;
                 scratch[place(i, RESPONSE + k) + lane] = acceleration[b];
             }
             scratch[place(i, INVERSE) + lane] = inverse[here];
-            scratch[place(i, DIAGONAL) + lane] = stiffness[here];
+            let shortened = (lengths[0] / lengths[1]).max(L::Scalar::from_f64(1.0));
+            scratch[place(i, DIAGONAL) + lane] = stiffness[here] * shortened * shortened;
         }
     }
 }

@@ -44,6 +44,8 @@ pub struct Header {
 pub struct Params {
     /// Nodes in a plane of the position buffers.
     pub nodes: u32,
+    /// Factor on the axial stiffness of fibres across their lines, see [`crate::dynamics::time_step::left`]; 0 without lines.
+    pub left: f32,
 }
 
 /// Reads, in binding order.
@@ -207,4 +209,24 @@ fn turn<L: Lane>(q: &Tensor<L>, a: &Tensor<L>, out: bool) -> Tensor<L> {
         }
     }
     full
+}
+
+#[inline(always)]
+pub fn dot<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
+    a[2].fma(b[2], a[1].fma(b[1], a[0] * b[0]))
+}
+
+#[inline(always)]
+pub fn cross<L: Lane>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Sum of eight numbers, in order.
+#[inline(always)]
+pub fn total<L: Lane>(numbers: &[L; 8]) -> L {
+    let mut sum = numbers[0];
+    for number in &numbers[1..] {
+        sum = sum + *number;
+    }
+    sum
 }

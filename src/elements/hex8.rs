@@ -5,7 +5,7 @@
 //! fibre's frame first; a macroscopic gradient F̄ − I is added to H.
 
 use super::LANES;
-use super::block::{BINARY, Lanes, OUT, Params};
+use super::block::{BINARY, Lanes, OUT, Params, cross, dot, total};
 use crate::kernel::lane::Lane;
 use crate::kernel::shader::{Shader, Share};
 use crate::kernel::stage::{Io, Kernel};
@@ -30,7 +30,7 @@ type Derivatives<L> = [[[L; 4]; 3]; 3];
 pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
 /// Energies by mode and smallest Jacobian.
 pub struct Energy<M>(PhantomData<M>);
-/// Row sums of the stiffness that fibre lines do not cover.
+/// Row sums of the stiffness that fibre lines do not cover, see [`crate::dynamics::time_step`].
 pub struct Bound<M>(PhantomData<M>);
 
 /// Displacements of the corners relative to the first, in the fibre's frame, by component and binary corner.
@@ -207,20 +207,56 @@ impl<L: Lane, M: Material> Visitor<L> for Energies<L, M> {
     }
 }
 
-/// Sums the bound of each corner's stiffness: modulus × |∇N_a| × Σ|∇N|, across the fibre.
+/// Sums the bound of each corner's stiffness, modulus × |∂N_a| × Σ|∂N|: across the fibre, in longitudinal shear, of tension,
+/// and of the fibre as far as lines do not cover it.
 struct Bounds<L: Lane, M> {
     material: [L; PARAMETERS],
     rows: [L; 8],
+    /// Displacement of the high against the low corner of the four edges along ξ, by component.
+    edges: [[L; 4]; 3],
+    macroscopic: Tensor<L>,
+    /// See [`super::block::Params::left`].
+    left: f32,
     law: PhantomData<M>,
+}
+
+impl<L: Lane, M: Material> Bounds<L, M> {
+    /// Sizes of the derivatives along the fibre that lines do not cover. A line acts along its own edge, and a fibre at the
+    /// Gauss point may have another direction, where the four edges have turned away from each other.
+    #[inline(always)]
+    fn uncovered(&self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, along: &[L; 8]) -> [L; 8] {
+        let mut sizes = along.map(|slope| slope.abs());
+        if self.left == 0.0 {
+            return sizes;
+        }
+        let (one, half) = (L::new(1.0), L::new(0.5));
+        let fibre = [one + h[0][0], h[1][0], h[2][0]];
+        let (first, rest) = (inverse(lanes, point, 0), cross(&inverse(lanes, point, 1), &inverse(lanes, point, 2)));
+        let scale = one / dot(&first, &rest);
+        let rest = [rest[0] * scale, rest[1] * scale, rest[2] * scale];
+        for edge in 0..4 {
+            let mut now = rest;
+            for i in 0..3 {
+                let m = &self.macroscopic[i];
+                now[i] = rest[i] + m[2].fma(rest[2], m[1].fma(rest[1], m[0].fma(rest[0], self.edges[i][edge])));
+            }
+            let turned = cross(&now, &fibre);
+            let sine = (dot(&turned, &turned) / (dot(&now, &now) * dot(&fibre, &fibre))).sqrt();
+            let (low, high) = (along[2 * edge], along[2 * edge + 1]);
+            let size = sine.fma((half * (high - low)).abs(), (half * (high + low)).abs());
+            (sizes[2 * edge], sizes[2 * edge + 1]) = (size, size);
+        }
+        sizes
+    }
 }
 
 impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
     #[inline(always)]
     fn point(&mut self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, volume: L) {
         let inverse = [inverse(lanes, point, 0), inverse(lanes, point, 1), inverse(lanes, point, 2)];
-        let mut sizes = [L::new(0.0); 8];
-        let mut total = L::new(0.0);
-        for (a, size) in sizes.iter_mut().enumerate() {
+        let zero = L::new(0.0);
+        let mut slopes = [[zero; 8]; 3];
+        for a in 0..8 {
             let (mut n, mut sign) = ([L::new(FAR); 3], [L::new(-1.0); 3]);
             for k in 0..3 {
                 if a >> k & 1 == point >> k & 1 {
@@ -231,17 +267,24 @@ impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
                 }
             }
             let slope = [sign[0] * n[1] * n[2], sign[1] * n[0] * n[2], sign[2] * n[0] * n[1]];
-            let mut square = L::new(0.0);
-            for j in 1..3 {
-                let across = slope[2].fma(inverse[2][j], slope[1].fma(inverse[1][j], slope[0] * inverse[0][j]));
-                square = across.fma(across, square);
+            for (j, slopes) in slopes.iter_mut().enumerate() {
+                slopes[a] = slope[2].fma(inverse[2][j], slope[1].fma(inverse[1][j], slope[0] * inverse[0][j]));
             }
-            *size = square.sqrt();
-            total = total + *size;
         }
-        let k = M::stiffness(&self.material, h) * volume * total;
-        for (row, size) in self.rows.iter_mut().zip(sizes) {
-            *row = k.fma(size, *row);
+        let left = self.uncovered(lanes, point, h, &slopes[0]);
+        let slopes = slopes.map(|slopes| slopes.map(|slope| slope.abs()));
+        let mut across = slopes[1];
+        for (across, other) in across.iter_mut().zip(&slopes[2]) {
+            *across = other.fma(*other, *across * *across).sqrt();
+        }
+        let sums = [total(&slopes[0]), total(&slopes[1]), total(&slopes[2])];
+        let (sum_across, sum_left) = (total(&across), total(&left));
+        let m = M::moduli(&self.material, h);
+        let fibres = m.along * L::new(if self.left == 0.0 { 1.0 } else { f64::from(self.left) });
+        for a in 0..8 {
+            let others = m.rows([slopes[0][a], slopes[1][a], slopes[2][a]], across[a], sums, sum_across);
+            let row = (fibres * left[a]).fma(sum_left, others);
+            self.rows[a] = row.fma(volume, self.rows[a]);
         }
     }
 }
@@ -251,7 +294,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { nodes } = io.params();
+        let Params { nodes, .. } = io.params();
         let mut slots = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
@@ -288,7 +331,7 @@ impl<M: Material> Kernel for Energy<M> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { nodes } = io.params();
+        let Params { nodes, .. } = io.params();
         let mut out = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
@@ -315,13 +358,20 @@ impl<M: Material> Kernel for Bound<M> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { nodes } = io.params();
+        let Params { nodes, left } = io.params();
         let mut out = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
                 let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
-                let mut bounds =
-                    Bounds::<L, M> { material: lanes.material(io), rows: [L::new(0.0); 8], law: PhantomData };
+                let u = local_displacements(io, &lanes, nodes as usize);
+                let mut bounds = Bounds::<L, M> {
+                    material: lanes.material(io),
+                    rows: [L::new(0.0); 8],
+                    edges: u.map(|u| [u[1] - u[0], u[3] - u[2], u[5] - u[4], u[7] - u[6]]),
+                    macroscopic: lanes.macroscopic(io),
+                    left,
+                    law: PhantomData,
+                };
                 visit(io, &lanes, nodes as usize, &mut bounds);
                 let out = out.item(0, item);
                 for (corner, &binary) in BINARY.iter().enumerate() {

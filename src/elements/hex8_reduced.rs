@@ -14,7 +14,7 @@
 //! and leaves W. The modes bend fibres within an element: there the fibres' own stiffness has no part.
 
 use super::LANES;
-use super::block::{BINARY, Lanes, OUT, Params};
+use super::block::{BINARY, Lanes, OUT, Params, dot, total};
 use crate::kernel::lane::Lane;
 use crate::kernel::shader::{Shader, Share};
 use crate::kernel::stage::{Io, Kernel};
@@ -60,11 +60,6 @@ fn slope<L: Lane>(lanes: &Lanes<L>, corner: usize) -> [L; 3] {
 fn moment<L: Lane>(lanes: &Lanes<L>, mode: usize) -> [L; 3] {
     let first = MOMENTS + 3 * mode;
     [lanes.shape(first), lanes.shape(first + 1), lanes.shape(first + 2)]
-}
-
-#[inline(always)]
-fn dot<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
-    a[2].fma(b[2], a[1].fma(b[1], a[0] * b[0]))
 }
 
 /// Σ_a h_αa u_a of each mode.
@@ -145,7 +140,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { nodes } = io.params();
+        let Params { nodes, .. } = io.params();
         let mut slots = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
@@ -193,7 +188,7 @@ impl<M: Material> Kernel for Energy<M> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { nodes } = io.params();
+        let Params { nodes, .. } = io.params();
         let mut out = io.own::<L::Scalar>(OUT);
         let mut hourglass = io.own::<L::Scalar>(OUT_HOURGLASS);
         for item in items {
@@ -228,7 +223,7 @@ impl<M: Material> Kernel for Bound<M> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { nodes } = io.params();
+        let Params { nodes, left } = io.params();
         let mut out = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
@@ -236,42 +231,53 @@ impl<M: Material> Kernel for Bound<M> {
                 let Deformation { h, modes } = deformation(io, &lanes, nodes as usize);
                 let zero = L::new(0.0);
                 let mut rows = [zero; 8];
-                // modulus × V |B_a| Σ|B|, across the fibre
-                let (mut sizes, mut total) = ([zero; 8], zero);
-                for (corner, size) in sizes.iter_mut().enumerate() {
+                // modulus × V |B_a| Σ|B|
+                let mut slopes = [[zero; 8]; 3];
+                let mut across = [zero; 8];
+                for corner in 0..8 {
                     let b = slope(&lanes, corner);
-                    *size = b[2].fma(b[2], b[1] * b[1]).sqrt();
-                    total = total + *size;
-                }
-                let (material, volume) = (lanes.material(io), lanes.shape(VOLUME));
-                add_rows(&mut rows, M::stiffness(&material, &h) * volume * total, &sizes);
-                // fibres are stiff along their mean, fibre lines heavy along each edge: what is between these directions is not
-                // covered, (d + e)² ≤ 2 d² + 2 e²
-                let (mut sizes, mut total) = ([zero; 8], zero);
-                for (corner, size) in sizes.iter_mut().enumerate() {
-                    let along = lanes.shape(3 * corner).abs();
-                    let mut square = zero;
-                    for i in 0..3 {
-                        let mut apart = zero;
-                        for mode in 1..4 {
-                            // of the derivative along ξ: the sign of ξ itself does not matter
-                            apart = apart + L::new(MODES[mode][corner]) * modes[mode][i];
-                        }
-                        square = apart.fma(apart, square);
+                    for k in 0..3 {
+                        slopes[k][corner] = b[k].abs();
                     }
-                    *size = along * along * square.sqrt();
-                    total = total + *size;
+                    across[corner] = b[2].fma(b[2], b[1] * b[1]).sqrt();
                 }
-                add_rows(&mut rows, L::new(2.0) * M::along(&material) * volume * total, &sizes);
+                let sums = [total(&slopes[0]), total(&slopes[1]), total(&slopes[2])];
+                let sum_across = total(&across);
+                let volume = lanes.shape(VOLUME);
+                let m = M::moduli(&lanes.material(io), &h);
+                for (corner, row) in rows.iter_mut().enumerate() {
+                    let slopes = [slopes[0][corner], slopes[1][corner], slopes[2][corner]];
+                    *row = volume * m.rows(slopes, across[corner], sums, sum_across);
+                }
+                if left == 0.0 {
+                    add_rows(&mut rows, m.along * volume * sums[0], &slopes[0]);
+                } else {
+                    // fibres are stiff along their mean, fibre lines heavy along each edge: what is between these directions is
+                    // not covered, (d + e)² ≤ 2 d² + 2 e²
+                    let mut sizes = [zero; 8];
+                    for (corner, size) in sizes.iter_mut().enumerate() {
+                        let along = lanes.shape(3 * corner).abs();
+                        let mut square = zero;
+                        for i in 0..3 {
+                            let mut apart = zero;
+                            for mode in 1..4 {
+                                // of the derivative along ξ: the sign of ξ itself does not matter
+                                apart = apart + L::new(MODES[mode][corner]) * modes[mode][i];
+                            }
+                            square = apart.fma(apart, square);
+                        }
+                        *size = along * along * square.sqrt();
+                    }
+                    add_rows(&mut rows, L::new(2.0) * m.along * volume * total(&sizes), &sizes);
+                }
                 // k |γ_a| Σ|γ|
                 for mode in 0..4 {
                     let moment = moment(&lanes, mode);
-                    let (mut sizes, mut total) = ([zero; 8], zero);
+                    let mut sizes = [zero; 8];
                     for (corner, size) in sizes.iter_mut().enumerate() {
                         *size = (L::new(MODES[mode][corner]) - dot(&moment, &slope(&lanes, corner))).abs();
-                        total = total + *size;
                     }
-                    add_rows(&mut rows, lanes.shape(STIFFNESS + mode) * total, &sizes);
+                    add_rows(&mut rows, lanes.shape(STIFFNESS + mode) * total(&sizes), &sizes);
                 }
                 let out = out.item(0, item);
                 for (corner, &binary) in BINARY.iter().enumerate() {

@@ -13,7 +13,7 @@
 //! and those are what the energy holds. The exponent p < 2 of compaction makes the tangent infinite at I_comp → 0⁻: below the
 //! cap the power is continued by the parabola with the same slope.
 
-use super::{Material, PARAMETERS, Tensor, add_product, jacobian};
+use super::{Material, Moduli, PARAMETERS, Tensor, add_product, jacobian};
 use crate::kernel::lane::Lane;
 use crate::kernel::math::{asinh_ratio, exp, ln, log1p};
 
@@ -147,7 +147,7 @@ impl Material for Charmetant {
     }
 
     #[inline(always)]
-    fn stiffness<L: Lane>(p: &[L; PARAMETERS], h: &Tensor<L>) -> L {
+    fn moduli<L: Lane>(p: &[L; PARAMETERS], h: &Tensor<L>) -> Moduli<L> {
         // In the cross-section: compaction (its tangent falls with |I_comp|, hence at least the cap's) and its stress,
         // and distortion; all grow with the inverse of the smaller stretch of the section.
         let (zero, one, half) = (L::new(0.0), L::new(1.0), L::new(0.5));
@@ -160,12 +160,14 @@ impl Material for Charmetant {
         let mean = one + half * (s.b22 + s.b33);
         let difference = s.dv.fma(s.dv, s.b23 * s.b23).sqrt();
         let smaller = (mean - difference).max(L::new(0.01));
-        let transverse = (tangent + L::new(0.25) * p[K_DIST] + stressed) / smaller;
-        transverse.max(p[K_SH])
-    }
-
-    #[inline(always)]
-    fn along<L: Lane>(p: &[L; PARAMETERS]) -> L {
-        p[K_ELONG]
+        let across = (tangent + L::new(0.25) * p[K_DIST] + stressed) / smaller;
+        // Shear |g|/c is driven by the fibre and by the widest direction of the section as they are stretched now; and its
+        // stress turns with both.
+        let g_g = s.g2.fma(s.g2, s.g3 * s.g3);
+        let widest = (mean + difference + g_g * s.inv_c) * s.inv_c;
+        let shear = p[K_SH] * s.inv_c * (one.max(widest) + g_g.sqrt() * s.inv_c);
+        let along = p[K_ELONG] * (one - s.i_elong).max(zero) * s.inv_c;
+        let tension = (p[K_ELONG] * s.i_elong * s.inv_c).max(zero);
+        Moduli { across, shear, along, tension }
     }
 }

@@ -22,10 +22,33 @@ pub trait Material: 'static {
     fn stress<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> Tensor<L>;
     /// Strain energy per reference volume, MPa, by mode (elongation, compaction, distortion, longitudinal shear).
     fn energy<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> [L; 4];
-    /// Upper estimate of the tangent stiffness in every direction that fibre lines do not cover, MPa.
-    fn stiffness<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> L;
-    /// Stiffness along the fibre at rest, MPa.
-    fn along<L: Lane>(parameters: &[L; PARAMETERS]) -> L;
+    /// Upper estimates of the tangent stiffness.
+    fn moduli<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> Moduli<L>;
+}
+
+/// Upper estimates of tangent stiffness by what is strained, MPa of the reference volume.
+pub struct Moduli<L> {
+    /// The cross-section, per displacement gradient across the fibre of motion across it.
+    pub across: L,
+    /// Longitudinal shear: motion along the fibre that varies across it, and motion across it that varies along it.
+    pub shear: L,
+    /// The fibre.
+    pub along: L,
+    /// Tension of the fibre, which resists motion across it that varies along it.
+    pub tension: L,
+}
+
+impl<L: Lane> Moduli<L> {
+    /// Row sum of a corner's stiffness per volume, less that of the fibre: from the sizes of the derivatives of its shape function
+    /// along each axis and across the fibre, and their sums over all corners.
+    #[inline(always)]
+    pub fn rows(&self, [along, second, third]: [L; 3], across: L, sums: [L; 3], sum_across: L) -> L {
+        // motion of the corner across the fibre, and along it
+        let sideways = (self.across * across)
+            .fma(sum_across, along * (self.shear * (sums[0] + sum_across) + self.tension * sums[0]));
+        let lengthways = self.shear * across.fma(sums[0], second.fma(sums[1], third * sums[2]));
+        sideways.max(lengthways)
+    }
 }
 
 /// The laws there are.

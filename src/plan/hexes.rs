@@ -31,7 +31,14 @@ struct Blocks<'a> {
 
 impl HexBuffers {
     /// Adds tables, results and stages; `position` are quanta and remainder of displacements.
-    pub(super) fn add(b: &mut Builder, solids: &Solids, position: [Buffer; 2], periodic: bool, reduced: bool) -> Self {
+    pub(super) fn add(
+        b: &mut Builder,
+        solids: &Solids,
+        position: [Buffer; 2],
+        periodic: bool,
+        reduced: bool,
+        params: Params,
+    ) -> Self {
         let hexes = solids.headers.len();
         let materials = b.table("materials", solids.materials.clone());
         let frames = b.table("fibre frames", solids.frames.clone());
@@ -47,7 +54,6 @@ impl HexBuffers {
         };
         let [quanta, remainder] = position;
         let reads = &[headers, corners, quanta, remainder, shapes, frames, materials];
-        let params = Params { nodes: (b.plan.buffers[remainder.0].len / 3) as u32 };
         for (law, range) in &solids.laws {
             let blocks = Blocks { range: range.clone(), reads, params };
             match law {

@@ -22,9 +22,9 @@ use crate::contact::{slot_state, status, travel};
 use crate::dynamics::assemble::{self, Assemble};
 use crate::dynamics::fibre_lines::{self, FibreLines};
 use crate::dynamics::integrate::{self, Integrate};
-use crate::dynamics::time_step;
+use crate::dynamics::time_step::{self, ElementLimit};
 use crate::elements::beam2::Beam2;
-use crate::elements::{LANES, bend};
+use crate::elements::{LANES, bend, block};
 use crate::error::Result;
 use crate::kernel::buffer::{Buffer, Description, Initial, Kind};
 use crate::kernel::position::quanta;
@@ -60,8 +60,6 @@ pub struct Model {
     pub slaves: Vec<Slave>,
     /// Numbers of a slot of a slave.
     pub slot_state: usize,
-    /// Factor on 2/ω of the explicit stiffness that fibre lines leave: √(1 − 1/(4β)).
-    pub line_factor: f64,
     /// Largest share of the smallest contact radius or yarn thickness, mm, for guards.
     pub limits: Limits,
 }
@@ -89,6 +87,10 @@ pub struct Buffers {
     pub quanta: Buffer,
     pub remainder: Buffer,
     pub velocity: Buffer,
+    /// Of the last step, mm/s² and 1/tonne, and what fibre lines add to the first.
+    pub acceleration: Buffer,
+    pub inverse_mass: Buffer,
+    pub correction: Option<Buffer>,
     pub status: Buffer,
     pub hex_energy: Option<Buffer>,
     pub beam_tension: Option<Buffer>,
@@ -244,7 +246,12 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let work = (works.count() > 0).then(|| b.scratch("work on nodes", works.count() * nodes));
 
     // forces of elements
-    let hex = HexBuffers::add(&mut b, &solids, [quanta_, remainder], periodic, hourglass.is_some());
+    let left = match &effects.fibre_lines {
+        Some(lines) if active.fibre_lines => time_step::left(lines.beta) as f32,
+        _ => 0.0,
+    };
+    let params = block::Params { nodes: nodes as u32, left };
+    let hex = HexBuffers::add(&mut b, &solids, [quanta_, remainder], periodic, hourglass.is_some(), params);
     let ends = b.indices("beam ends", threads.ends.clone());
     let beam_table = b.table("beams", threads.beams.clone());
     let beam_force = b.scratch("beam forces", 3 * beams);
@@ -264,13 +271,17 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         let kernel = flagged!(Beam2; periodic, active.thermal);
         b.plan.step.push(coded(kernel, "beam2", beams, 64, &reads, &writes, [0u32; 0]));
     }
-    let bend_buffers = active.bending.then(|| (b.scratch("bend forces", 6 * bends), b.scratch("bend energies", bends)));
+    let bent = active.bending.then(|| Bent {
+        table: b.table("bends", threads.bends.clone()),
+        slots: b.indices("bend slots of thread nodes", threads.bend_slots.clone()),
+        force: b.scratch("bend forces", 6 * bends),
+        energy: b.scratch("bend energies", bends),
+    });
     let bend_virial = (active.bending && periodic).then(|| b.scratch("bend stress sums", 9 * bends));
-    if let Some((force, energy)) = bend_buffers {
+    if let Some(bent) = &bent {
         let pairs = b.indices("bend beams", threads.pairs.clone());
-        let table = b.table("bends", threads.bends.clone());
-        let reads = [pairs, table, ends, beam_table, quanta_, remainder];
-        let mut writes = vec![(force, own(1, 6)), (energy, own(1, 1))];
+        let reads = [pairs, bent.table, ends, beam_table, quanta_, remainder];
+        let mut writes = vec![(bent.force, own(1, 6)), (bent.energy, own(1, 1))];
         writes.extend(bend_virial.map(|virial| (virial, own(1, 9))));
         b.plan.step.push(coded(flagged!(bend::Bend; periodic), "bend", bends, 64, &reads, &writes, [0u32; 0]));
     }
@@ -326,9 +337,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         mass_memory: contact_mass.map_or(0.0, |c| c.memory as f32),
     };
     let mut reads = vec![solid_slots, hex.force, thread_slots, beam_force, mass];
-    if let Some((force, _)) = bend_buffers {
-        reads.extend([b.indices("bend slots of thread nodes", threads.bend_slots.clone()), force]);
-    }
+    reads.extend(bent.iter().flat_map(|bent| [bent.slots, bent.force]));
     reads.extend(contact_mass.map(|_| element_limit));
     let mut writes = vec![(acceleration, own(3, 1)), (inverse_mass, own(1, 1))];
     let added_mass = contact_mass.map(|_| b.add("added mass", Kind::Scalar, nodes, true, Initial::Zero));
@@ -360,12 +369,10 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let line_stiffness = [&solids.line_stiffness[..], &threads.line_stiffness].concat();
     let mut covered = vec![false; nodes];
     let mut correction = None;
-    let mut line_factor = 1.0;
     if let Some(lines) = effects.fibre_lines.as_ref().filter(|_| active.fibre_lines) {
         for g in &line_groups {
             covered[g.first as usize..][..(g.lines * g.stations) as usize].fill(true);
         }
-        line_factor = libm::sqrt((1.0 - 0.25 / lines.beta).max(0.01));
         let response = b.scratch("line correction", 3 * nodes);
         correction = Some(response);
         let table = b.indices("fibre lines", bytemuck::cast_slice(&line_groups).to_vec());
@@ -394,13 +401,27 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     b.plan.step.push(waiting(coded(kernel, "integrate", nodes, NODE_GRAIN, &reads, &writes, params)));
 
     // limit of the time step
-    let constant = constant_stiffness(mesh, &threads, &line_stiffness, &covered);
+    if !active.fibre_lines {
+        // in the bounds of hexahedra
+        covered[..first].fill(true);
+    }
+    let constant = constant_stiffness(mesh, &line_stiffness, &covered);
     let constant = b.table("constant stiffness of nodes", constant);
     let solid_bounds = b.indices("corner bounds of solid nodes", solids.bounds.clone());
-    let reads = [solid_bounds, hex.bound, constant, mass];
+    let mut reads = vec![solid_bounds, hex.bound, constant, mass, thread_slots, beam_force, beam_table];
+    if let Some(bent) = &bent {
+        let rows = b.table("bend rows", threads.bend_rows.clone());
+        reads.extend([bent.slots, bent.table, bent.energy, bent.force, rows]);
+    }
     let params = time_step::Params { first_thread };
     let writes = [(element_limit, own(2, 1))];
-    b.plan.diagnose.push(after::<time_step::ElementLimit>("element limit", nodes, NODE_GRAIN, &reads, &writes, params));
+    let kernel = flagged!(ElementLimit; active.bending);
+    b.plan.diagnose.push(waiting(coded(kernel, "element limit", nodes, NODE_GRAIN, &reads, &writes, params)));
+    if let Some((at, count)) = condition_nodes {
+        let writes = [(element_limit, Access::Scatter)];
+        let held = after::<time_step::HeldLimit>("held limit", count, NODE_GRAIN, &[at], &writes, [0u32; 0]);
+        b.plan.diagnose.push(held);
+    }
 
     let (faces, pairs) = contact.as_ref().map_or((None, None), |c| (c.faces, c.pairs));
     let sources = totals::Sources {
@@ -424,7 +445,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         beam_tension,
         beam_work,
         beam_virial,
-        bend_energy: bend_buffers.map(|(_, energy)| energy),
+        bend_energy: bent.as_ref().map(|bent| bent.energy),
         bend_virial,
         contact_sums: faces.map(|f| f.sums),
         pair_sums: pairs.map(|p| p.sums),
@@ -446,6 +467,9 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             quanta: quanta_,
             remainder,
             velocity,
+            acceleration,
+            inverse_mass,
+            correction,
             status: status_,
             hex_energy: hex.energy,
             beam_tension,
@@ -472,9 +496,17 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         hex_volume: solids.volume,
         slaves: contact.map_or_else(Vec::new, |c| c.slaves),
         slot_state: slot_state(active.friction),
-        line_factor,
         limits: Limits { thread_radius: radius, yarn_thickness: thickness },
     })
+}
+
+/// Buffers of bends.
+struct Bent {
+    table: Buffer,
+    /// Bends at each thread node.
+    slots: Buffer,
+    force: Buffer,
+    energy: Buffer,
 }
 
 /// Largest top-to-bottom distance of a block's first section, mm.
@@ -555,11 +587,9 @@ fn line_groups(mesh: &Mesh, with_threads: bool) -> Vec<fibre_lines::Group> {
     groups
 }
 
-/// Row sums of stiffness that do not change: bending of threads, and axial stiffness where fibre lines do not cover it.
-fn constant_stiffness(mesh: &Mesh, threads: &Threads, axial: &[f64], covered: &[bool]) -> Vec<f64> {
-    let first = mesh.first_thread_node();
+/// Row sums of axial stiffness that is not covered otherwise.
+fn constant_stiffness(mesh: &Mesh, axial: &[f64], covered: &[bool]) -> Vec<f64> {
     let mut k = vec![0.0; mesh.nodes.len()];
-    k[first..].copy_from_slice(&threads.bending_stiffness);
     let blocks = mesh
         .blocks
         .iter()

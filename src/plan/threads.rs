@@ -27,8 +27,8 @@ pub struct Threads {
     pub tributary: Vec<f64>,
     /// EA/L₀ of the beam that starts at each thread node, N/mm.
     pub line_stiffness: Vec<f64>,
-    /// Row sum of bending stiffness of each thread node, N/mm.
-    pub bending_stiffness: Vec<f64>,
+    /// See [`crate::dynamics::time_step::ROWS`].
+    pub bend_rows: Vec<f64>,
     /// Thread of each beam.
     pub thread: Vec<u32>,
     /// See [`crate::contact::threads::ARC`].
@@ -48,7 +48,6 @@ impl Threads {
             mass: vec![0.0; nodes],
             tributary: vec![0.0; nodes],
             line_stiffness: vec![0.0; nodes],
-            bending_stiffness: vec![0.0; nodes],
             radius: vec![0.0; nodes],
             ..Self::default()
         };
@@ -105,10 +104,10 @@ impl Threads {
                 let weights = [1.0 / l1, 1.0 / l1 + 1.0 / l2, 1.0 / l2];
                 let total: f64 = weights.iter().sum();
                 let nodes = [t.ends[2 * pair[0]], t.ends[2 * pair[0] + 1], t.ends[2 * pair[1] + 1]];
-                for (place, (node, weight)) in nodes.into_iter().zip(weights).enumerate() {
-                    let node = node as usize - first;
-                    t.bending_stiffness[node] += 0.5 * stiffness * weight * total;
-                    t.bend_slots[BENT * node + place] = bend as u32;
+                t.bend_rows.extend(weights.map(|weight| 0.5 * stiffness * weight * total));
+                t.bend_rows.push(l1);
+                for (place, node) in nodes.into_iter().enumerate() {
+                    t.bend_slots[BENT * (node as usize - first) + place] = bend as u32;
                 }
             }
         }

@@ -54,14 +54,11 @@ impl Simulation {
         Ok(())
     }
 
-    /// Stops a step that the user fixed and that cannot be stable; one that follows the estimate shortens by itself. The
-    /// estimate counts prescribed nodes too, which cannot swing: where one of them sets it, it proves nothing.
+    /// Stops a step that the user fixed and that cannot be stable; one that follows the estimate shortens by itself.
     pub(super) fn guard_step(&self) -> Result<()> {
         let limit = self.health.dt_limit;
         match self.case.integration.dt_s {
-            Some(dt)
-                if dt > SURELY_UNSTABLE * limit && !self.prescribed_nodes().contains(&self.health.limiting_node) =>
-            {
+            Some(dt) if dt > SURELY_UNSTABLE * limit => {
                 let node = self.health.limiting_node;
                 let culprit = format!(
                     "the step of {dt:.3e} s is longer than {SURELY_UNSTABLE} times the estimated limit of {limit:.3e} s, \

@@ -139,7 +139,7 @@ impl Simulation {
     }
 
     /// Buffers that hold more than constants: what persists, and what the last steps left for tables and frames.
-    fn changing(&self) -> Vec<Buffer> {
+    pub(super) fn changing(&self) -> Vec<Buffer> {
         let buffers = self.model.plan.buffers.iter().enumerate();
         let changing =
             buffers.filter(|(_, b)| (b.persistent || matches!(b.initial, Initial::Zero)) && !REBUILT.contains(&b.name));

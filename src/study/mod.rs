@@ -11,3 +11,4 @@ pub mod effects;
 pub mod results;
 pub mod scene;
 pub mod stability;
+pub mod step;

@@ -1,0 +1,187 @@
+//! The limit of the time step as it is: 2/ω of the fastest oscillation of the whole scene about its present state, by power
+//! iteration. Stiffness comes from differences of all forces, with every contact held by friction; the mass matrix is the one
+//! that acts, with fibre lines and contact-aware mass. Both of these grow with the step, so the limit is the step that is its own limit.
+
+use super::Simulation;
+use crate::case::steps::Precision;
+use crate::error::{Error, Result};
+use crate::kernel::position::QUANTUM;
+use crate::kernel::row::Row;
+use crate::kernel::stage::Stage;
+use crate::plan;
+
+/// Friction that holds every contact.
+const STICK: f64 = 1e6;
+/// Largest displacement of a node to either side, mm.
+const REACH: f64 = 1e-6;
+/// Time over which the displacement is made, s: so slowly that contact is not damped.
+const SLOWLY: f64 = 1.0;
+/// Rounds of power iteration after which ω must not have grown, and the most rounds there are.
+const PATIENCE: usize = 20;
+const MOST_ROUNDS: usize = 1500;
+/// Relative growth of ω² that is none.
+const SETTLED: f64 = 1e-3;
+/// Relative difference between a step and its limit at which the two are the same.
+const SAME: f64 = 3e-3;
+/// Where a step that is never long enough for its own mass is given up, as a multiple of the first.
+const FAR: f64 = 100.0;
+
+/// A measured limit of the time step.
+#[derive(Debug, Clone, Copy)]
+pub struct Limit {
+    /// Largest stable step, s.
+    pub dt: f64,
+    /// Node that moves most in the fastest oscillation.
+    pub node: usize,
+    /// Direction in which it does.
+    pub direction: [f64; 3],
+}
+
+/// The scene about its present state.
+struct Oscillation<'a> {
+    scene: &'a mut Simulation,
+    /// The step up to accelerations.
+    stages: Vec<Stage>,
+    row: Row<f64>,
+    /// Displacements at rest, mm, in planes.
+    rest: Vec<f64>,
+    /// Components that may move.
+    free: Vec<bool>,
+    motion: Vec<f64>,
+    /// A times the motion.
+    inertia: Vec<f64>,
+    seed: u64,
+}
+
+impl Simulation {
+    /// Largest stable step at the present state. Take it where [`advance`](Self::advance) has returned; the state stays as it is.
+    ///
+    /// # Errors
+    /// A run in f32, whose forces are too coarse for differences.
+    pub fn measured_limit(&mut self) -> Result<Limit> {
+        if self.make.precision != Precision::F64 {
+            return Err(Error::Unsupported(
+                "the limit of the time step is measured in f64: set integration.precision".into(),
+            ));
+        }
+        let mut stages = plan::build(&self.case, STICK, &self.mesh, self.capacity)?.plan.step;
+        let moved = self.model.buffers.remainder;
+        stages.retain(|stage| stage.writes.iter().all(|(buffer, _)| *buffer != moved));
+        let b = &self.model.buffers;
+        let (quanta, remainder) = (self.backend.ints(b.quanta), self.backend.scalars(b.remainder));
+        let rest: Vec<f64> = quanta.iter().zip(remainder).map(|(q, r)| f64::from(*q) * QUANTUM + r).collect();
+        let nodes = self.mesh.nodes.len();
+        let mut free = vec![true; 3 * nodes];
+        if let Some(prescribed) = b.prescribed {
+            for condition in self.backend.uints(prescribed).chunks_exact(2) {
+                (0..3)
+                    .filter(|k| condition[1] >> k & 1 == 1)
+                    .for_each(|k| free[condition[0] as usize + k * nodes] = false);
+            }
+        }
+        let row = self.schedule.row(self.time, self.dt, self.dt);
+        let row = Row {
+            rate: [[0.0; 3]; 3],
+            thermal_increment: 0.0,
+            radius_increment: 0.0,
+            motion: 0.0,
+            approach: 0.0,
+            ..row
+        };
+        let changing = self.changing();
+        self.backend.save(&changing);
+        let first = self.dt;
+        let mut oscillation = Oscillation {
+            motion: vec![0.0; 3 * nodes],
+            inertia: Vec::new(),
+            scene: self,
+            stages,
+            row,
+            rest,
+            free,
+            seed: 1,
+        };
+        let mut dt = first;
+        loop {
+            let limit = oscillation.limit(dt);
+            let same = (limit / dt - 1.0).abs() < SAME;
+            dt = limit;
+            if same || dt > FAR * first {
+                break;
+            }
+        }
+        let motion = std::mem::take(&mut oscillation.motion);
+        self.backend.restore();
+        let at = |node: usize| [0, 1, 2].map(|k| motion[node + k * nodes]);
+        let size = |node: &usize| at(*node).iter().map(|x| x * x).sum::<f64>();
+        let node = (0..nodes).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
+        Ok(Limit { dt, node, direction: at(node) })
+    }
+}
+
+impl Oscillation<'_> {
+    /// 2/ω of the fastest oscillation with the mass that a step of `dt` calls for.
+    fn limit(&mut self, dt: f64) -> f64 {
+        (self.row.dt, self.row.dt_mid) = (dt, 0.5 * (dt + SLOWLY));
+        self.stir();
+        let (mut best, mut since) = (0.0, 0);
+        for round in 0..MOST_ROUNDS {
+            let (force, response) = self.respond();
+            // the quotient of Rayleigh, since A times the motion is known from the round before
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let square = dot(&self.motion, &force) / dot(&self.motion, &self.inertia);
+            if round > 0 && square > best * (1.0 + SETTLED) {
+                (best, since) = (square, round);
+            }
+            let most = response.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            if round > since + PATIENCE || most == 0.0 {
+                best = best.max(square);
+                break;
+            }
+            self.motion = response.iter().map(|x| x / most).collect();
+            self.inertia = force.iter().map(|f| f / most).collect();
+        }
+        2.0 / best.sqrt()
+    }
+
+    /// Adds a bit of every motion, so that none is missed.
+    fn stir(&mut self) {
+        for (motion, free) in self.motion.iter_mut().zip(&self.free) {
+            self.seed = self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            if *free {
+                *motion += (self.seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+            }
+        }
+        self.inertia = vec![0.0; self.motion.len()];
+    }
+
+    /// K times the motion, and A⁻¹K times the motion.
+    fn respond(&mut self) -> (Vec<f64>, Vec<f64>) {
+        let sides = [1.0, -1.0].map(|side| self.forces(side * REACH));
+        let slope = |i: usize, of: fn(&[Vec<f64>; 2]) -> &Vec<f64>| {
+            (of(&sides[1])[i] - of(&sides[0])[i]) / (2.0 * REACH) * f64::from(u8::from(self.free[i]))
+        };
+        let all = 0..self.motion.len();
+        (all.clone().map(|i| slope(i, |s| &s[0])).collect(), all.map(|i| slope(i, |s| &s[1])).collect())
+    }
+
+    /// Forces and accelerations with the motion times `reach` added to the present state, in planes.
+    fn forces(&mut self, reach: f64) -> [Vec<f64>; 2] {
+        let (b, backend) = (&self.scene.model.buffers, &mut self.scene.backend);
+        backend.restore();
+        let velocity: Vec<f64> = self.motion.iter().map(|u| u * reach / SLOWLY).collect();
+        let moved: Vec<f64> = self.rest.iter().zip(&self.motion).map(|(x, u)| x + u * reach).collect();
+        backend.clear(b.quanta);
+        backend.set_scalars(b.remainder, &moved);
+        backend.set_scalars(b.velocity, &velocity);
+        backend.run(&self.stages, &[self.row]);
+        let mut acceleration = backend.scalars(b.acceleration);
+        let inverse = backend.scalars(b.inverse_mass);
+        let force = acceleration.iter().zip(inverse.iter().cycle()).map(|(a, m)| if *m > 0.0 { a / m } else { 0.0 });
+        let force = force.collect();
+        if let Some(correction) = b.correction {
+            acceleration.iter_mut().zip(backend.scalars(correction)).for_each(|(a, c)| *a += c);
+        }
+        [force, acceleration]
+    }
+}
