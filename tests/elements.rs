@@ -18,9 +18,9 @@ fn scene(blocks: Value) -> Value {
     with(bare(), &[("/domain/mesh/blocks", blocks), ("/integration", json!({ "dt_s": 1e-9, "energy_tolerance": 100 }))])
 }
 
-/// Both hexahedra, and how a case gets them.
-/// A kind of hexahedra, and how a case asks for it.
+/// A kind of hexahedra, and how a case gets it.
 type Hexahedra = (&'static str, fn(Value) -> Value);
+/// Both kinds.
 const HEXAHEDRA: [Hexahedra; 2] = [("full", |case| case), ("reduced", reduced)];
 
 /// Forces on all nodes, from the velocities after one short step from rest.
