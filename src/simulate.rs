@@ -229,6 +229,10 @@ impl Simulation {
     pub fn backend(&self) -> &dyn Backend {
         &*self.backend
     }
+    /// Whether a device runs the scene rather than the CPU.
+    pub fn on_device(&self) -> bool {
+        self.make.device.is_some()
+    }
     /// Whether the backend still computes.
     ///
     /// # Errors

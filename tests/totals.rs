@@ -162,7 +162,8 @@ fn check<R: Run>(case: &Value, until: f64, precision: Precision, rounding: f64) 
         compare("added mass", sums.unwrap(), 0, get("added mass")[range].to_vec());
     }
     println!("{compared} sums that are not zero");
-    assert!(compared > 20);
+    // a free scene has no stresses to add up
+    assert!(compared > if model.active.periodic { 20 } else { 14 });
 
     let limits = &get("element stiffness of nodes")[nodes..];
     let stiffest = (0..nodes).fold(0, |best, node| if limits[node] > limits[best] { node } else { best });

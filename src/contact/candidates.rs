@@ -53,6 +53,7 @@ impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PER
         defines: &[when(THREAD, "THREAD"), when(PERIODIC, "PERIODIC")],
         ..Shader::new("contact/candidates", "candidates")
     };
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

@@ -104,6 +104,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
         defines: &[when(THREAD, "THREAD"), when(FRICTION, "FRICTION"), when(PERIODIC, "PERIODIC")],
         ..Shader::new("contact/penalty", "penalty")
     };
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

@@ -214,6 +214,7 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
         defines: &[when(FRICTION, "FRICTION"), when(PERIODIC, "PERIODIC")],
         ..Shader::new("contact/threads", "force")
     };
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

@@ -85,6 +85,8 @@ pub trait Real: Lane<Scalar = Self> + Pod + Send + Sync + PartialOrd + Default {
 
 /// Something to run on registers that are known only at run time.
 pub trait Work<R: Real> {
+    /// Whether it gains from the widest registers there are.
+    const WIDE: bool;
     fn run<L: Lane<Scalar = R>>(self);
 }
 
@@ -398,12 +400,12 @@ macro_rules! scalar {
             fn dispatch<W: Work<Self>>(isa: Isa, work: W) {
                 #[cfg(target_arch = "x86_64")]
                 match isa {
-                    Isa::Avx512 => {
+                    Isa::Avx512 if W::WIDE => {
                         if let Some(simd) = V4::try_new() {
                             return Simd::vectorize(simd, On(work, std::marker::PhantomData::<$scalar>));
                         }
                     }
-                    Isa::Avx2 => {
+                    Isa::Avx512 | Isa::Avx2 => {
                         if let Some(simd) = V3::try_new() {
                             return Simd::vectorize(simd, On(work, std::marker::PhantomData::<$scalar>));
                         }

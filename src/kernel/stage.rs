@@ -64,6 +64,8 @@ pub struct Plan {
 pub trait Kernel: 'static {
     /// Its WGSL twin.
     const SHADER: Shader;
+    /// Whether it works on registers, and gains from the widest; one that works number by number is compiled for fewer.
+    const WIDE: bool = true;
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>);
 }
 
@@ -99,6 +101,7 @@ impl Code {
 fn run<K: Kernel, R: Real>(io: &Io<R>, items: Range<usize>) {
     struct Job<'a, K, R: Real>(&'a Io<'a, R>, Range<usize>, PhantomData<K>);
     impl<K: Kernel, R: Real> Work<R> for Job<'_, K, R> {
+        const WIDE: bool = K::WIDE;
         #[inline(always)]
         fn run<L: Lane<Scalar = R>>(self) {
             K::run::<L>(self.0, self.1);

@@ -1,10 +1,10 @@
 //! A look at a case before it is run: sizes, effects, expected time, and on request what each effect costs and the whole algorithm.
 
 use super::effects::{Effect, effects};
-use super::turns::{ratio, step_time};
+use super::turns::{Ratio, ratio, step_time, trial, wall};
 use super::{scene, simulation};
 use crate::case::read::Loaded;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::simulate::{Make, Simulation};
 use std::fmt::Write as _;
 
@@ -23,7 +23,7 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
     // a few steps for the expected time; the first burst warms up
     probe.advance(16.0 * dt, |_| false)?;
     let before = probe.backend().timings();
-    let per_step = step_time(&mut probe, 64)?;
+    let per_step = step_time(&mut probe, 64, wall)?;
     let stages = since(&before, probe.backend().timings());
     let found = effects(loaded, &probe);
     let settled = loaded
@@ -56,7 +56,7 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
         probe.backend().describe()
     );
     if explain {
-        costs(&mut t, loaded, &mut probe, &found, &stages, per_step)?;
+        costs(&mut t, loaded, &found, &stages, per_step)?;
         let plan = &probe.model.plan;
         for (list, stages) in [
             ("step", &plan.step),
@@ -96,29 +96,38 @@ fn since(before: &[(&'static str, f64)], now: Vec<(&'static str, f64)>) -> Vec<(
     now.into_iter().map(|(name, seconds)| (name, seconds - old(name))).collect()
 }
 
+/// A scene for a trial, after its first contact search.
+fn begun(loaded: &Loaded) -> Result<Simulation> {
+    let mut simulation = simulation(loaded, trial(&Make::default()))?;
+    simulation.advance(0.0, |_| false)?;
+    Ok(simulation)
+}
+
 /// What called for each effect, and its share of the time of all stages: of those that are there for it alone, or, where it is
 /// part of stages that others share, by trials without it.
 fn costs(
     t: &mut String,
     loaded: &Loaded,
-    probe: &mut Simulation,
     found: &[Effect],
     stages: &[(&'static str, f64)],
     per_step: f64,
 ) -> Result<()> {
     let total: f64 = stages.iter().map(|(_, seconds)| seconds).sum();
     let steps = ((TURNS_S / (2 * TURNS) as f64 / per_step) as u64).clamp(8, 256);
+    let mut all = begun(loaded)?;
     let _ = write!(t, "\neffects, their share of the time of a step where the run starts, and what called for them");
     for effect in found {
         let own = stages.iter().filter(|(name, _)| effect.stages.contains(name));
         let share = 100.0 * own.map(|(_, seconds)| seconds).sum::<f64>() / total;
         let shown = match effect.without(loaded).filter(|_| effect.stages.is_empty()) {
-            Some(without) => {
-                let mut without = simulation(&without, Make::default())?;
-                without.advance(0.0, |_| false)?;
-                let ratio = ratio(&mut without, probe, steps, TURNS)?;
-                format!("{:5.1} ± {:3.1} % *", 100.0 * (1.0 - ratio.median), 100.0 * ratio.spread)
-            }
+            Some(without) => match begun(&without) {
+                Ok(mut without) => {
+                    let Ratio { median, spread } = ratio(&mut without, &mut all, steps, TURNS)?;
+                    format!("{:5.1} ± {:3.1} % *", 100.0 * (1.0 - median), 100.0 * spread)
+                }
+                Err(Error::Guard(guard)) => format!("{} guard", guard.cause),
+                Err(error) => return Err(error),
+            },
             None if effect.stages.is_empty() => "".into(),
             None => format!("{share:5.1} %"),
         };

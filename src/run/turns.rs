@@ -1,8 +1,15 @@
-//! Times of the step of scenes, taken in turns: whatever else the machine does meets the scenes that are compared alike.
+//! Times of the step of scenes, taken in turns: whatever else the machine does meets the scenes that are compared alike. On the
+//! CPU a trial has one thread, and what counts is how long that has run, not how long it has waited for a core.
 
 use crate::error::Error;
-use crate::simulate::Simulation;
+use crate::simulate::{Make, Simulation};
+use std::sync::LazyLock;
 use std::time::Instant;
+
+/// The machine for a trial: one thread of the CPU, or the device.
+pub fn trial(make: &Make) -> Make {
+    Make { threads: 1, ..make.clone() }
+}
 
 /// Time of a step of a scene over that of another: median over the turns, and half of the distance between their quartiles.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,12 +32,13 @@ impl Ratio {
     }
 }
 
-/// Advances two scenes by about `steps` steps each, `rounds` times, the one that begins taking turns. A scene that a guard stops
+/// Advances two scenes on the machine of a [`trial`] by about `steps` steps each, `rounds` times, the one that begins taking turns. A scene that a guard stops
 /// takes no further turns.
 ///
 /// # Errors
 /// A device that failed.
 pub fn ratio(scene: &mut Simulation, beside: &mut Simulation, steps: u64, rounds: usize) -> Result<Ratio, Error> {
+    let clock = if scene.on_device() { wall } else { ran };
     let mut ratios = Vec::with_capacity(rounds);
     // the first round warms up
     for round in 0..=rounds {
@@ -38,7 +46,7 @@ pub fn ratio(scene: &mut Simulation, beside: &mut Simulation, steps: u64, rounds
         let mut times = [0.0; 2];
         let mut stopped = false;
         for place in if round % 2 == 0 { [0, 1] } else { [1, 0] } {
-            match step_time(pair[place], steps) {
+            match step_time(pair[place], steps, clock) {
                 Ok(time) => times[place] = time,
                 Err(Error::Guard(_)) => stopped = true,
                 Err(error) => return Err(error),
@@ -54,11 +62,32 @@ pub fn ratio(scene: &mut Simulation, beside: &mut Simulation, steps: u64, rounds
     Ok(Ratio::of(ratios))
 }
 
-/// Seconds of wall time a step, over about `steps` steps.
-pub(super) fn step_time(scene: &mut Simulation, steps: u64) -> Result<f64, Error> {
-    let (before, started) = (scene.step(), Instant::now());
+/// Seconds of a step by a clock, over about `steps` steps.
+pub(super) fn step_time(scene: &mut Simulation, steps: u64, clock: impl Fn() -> f64) -> Result<f64, Error> {
+    let (before, started) = (scene.step(), clock());
     scene.advance(scene.time() + steps as f64 * scene.dt(), |_| false)?;
-    Ok(started.elapsed().as_secs_f64() / (scene.step() - before).max(1) as f64)
+    Ok((clock() - started) / (scene.step() - before).max(1) as f64)
+}
+
+/// Seconds of wall time, from a moment on.
+pub(super) fn wall() -> f64 {
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    START.elapsed().as_secs_f64()
+}
+
+/// Seconds that this thread has run; wall time where the system does not tell.
+#[cfg(unix)]
+fn ran() -> f64 {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: the system writes to a place that is there.
+    let told = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) } == 0;
+    if told { time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64 } else { wall() }
+}
+
+/// Seconds of wall time: the system does not tell how long a thread has run.
+#[cfg(not(unix))]
+fn ran() -> f64 {
+    wall()
 }
 
 #[cfg(test)]

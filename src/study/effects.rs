@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::output::directory;
 use crate::output::table::{Cell, Table};
 use crate::run::effects::effects as effects_of;
-use crate::run::turns::{Ratio, ratio};
+use crate::run::turns::{Ratio, ratio, trial};
 use crate::run::{self, Machine};
 use crate::simulate::{Make, Simulation};
 use std::fmt::Write as _;
@@ -193,14 +193,14 @@ fn compare(name: &'static str, variant: &Done, whole: &Done, measures: &[&Measur
 fn start(done: &Done, options: &Options) -> Result<Option<Simulation>> {
     let steps = &done.loaded.case.steps;
     let Some(before) = steps.len().checked_sub(2) else {
-        return run::simulation(&done.loaded, options.make.clone()).map(Some);
+        return run::simulation(&done.loaded, trial(&options.make)).map(Some);
     };
     let end = format!("-{}-{}.state", before + 1, steps[before].name());
     let states = done.folder.join("state");
     let entries = std::fs::read_dir(&states).map_err(|e| Error::file(&states, e))?;
     let mut paths = entries.filter_map(|entry| entry.ok().map(|entry| entry.path()));
     let found = paths.find(|path| path.to_string_lossy().ends_with(&end));
-    found.map(|state| run::simulation_at(&done.loaded, options.make.clone(), &state)).transpose()
+    found.map(|state| run::simulation_at(&done.loaded, trial(&options.make), &state)).transpose()
 }
 
 /// The table for a person.

@@ -82,6 +82,10 @@ pub fn held_specimen() -> Value {
 /// Replaces or adds values at paths such as `/effects/mass_floor`.
 pub fn with(mut value: Value, changes: &[(&str, Value)]) -> Value {
     for (path, new) in changes {
+        if let Some(place) = value.pointer_mut(path) {
+            *place = new.clone();
+            continue;
+        }
         let (parent, key) = path.rsplit_once('/').unwrap();
         value.pointer_mut(parent).unwrap_or_else(|| panic!("{path}"))[key] = new.clone();
     }
