@@ -49,7 +49,7 @@
 //! | [`output`] | frames, tables, maps, pictures, pages, checkpoints |
 //! | [`simulate`] | a scene in time: steps, contact searches, energies, guards |
 //! | [`run`] | a case with its files: what the program calls |
-//! | [`study`] | many runs at once: tables over a folder of scenes, how results differ |
+//! | [`study`] | many runs at once: tables over a folder of scenes, how results differ, what accuracy costs |
 //!
 //! Imports point one way: a module knows only those before it in this list (`tests/structure.rs` checks it).
 //! ```text
@@ -63,6 +63,7 @@
 //! - **An element**: a kernel in `elements` and its twin, its tables and a stage in `plan`, its slots in [`dynamics::assemble`].
 //! - **A contact law**: beside `contact::friction`; it sees one pair with its state and returns a force.
 //! - **A measure**: a file in `measure`, from [`mesh::Mesh`] and [`mesh::frame::Frame`]; a column in [`output::table`].
+//! - **A knob of accuracy**: a row in [`study::accuracy::turns`].
 //! - **A scene**: a JSON file in `cases/`. `tricot schema` lists every field.
 
 pub mod backend;

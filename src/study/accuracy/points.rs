@@ -69,6 +69,8 @@ pub struct Ran {
     pub message: String,
     /// Options of `tricot run` behind the name of the case, besides those of the study.
     pub flags: String,
+    /// What the study runs on.
+    pub base: String,
     /// Time without what the stopwatch took, s.
     pub wall_s: f64,
     /// That in steps of the stopwatch's scene, all of it and until the end of tightening.
@@ -160,7 +162,12 @@ impl<'a> Runner<'a> {
         let from = self.state(point, &loaded)?;
         let flags = self.flags(point, from.as_deref());
         let folder = self.folder(point);
-        if let Some(ran) = found(&folder, &loaded, &flags)? {
+        let base = format!(
+            "{:?}, {} threads",
+            self.options.machine,
+            self.options.threads.map_or("all".into(), |n| n.to_string())
+        );
+        if let Some(ran) = found(&folder, &loaded)?.filter(|ran| ran.flags == flags && ran.base == base) {
             return Ok(Some(ran));
         }
         let f64_on_gpu = loaded.case.integration.precision == Precision::F64 && self.options.machine == Machine::Gpu;
@@ -197,7 +204,7 @@ impl<'a> Runner<'a> {
             Err(error @ Error::Geometry { .. }) => return Ok(Some(impossible(&error))),
             Err(error) => return Err(error),
         };
-        let ran = Ran { ended, message, flags, wall_s, work, tightening, from_state: from.is_some() };
+        let ran = Ran { ended, message, flags, base, wall_s, work, tightening, from_state: from.is_some() };
         file::replace(&folder.join(RAN), |w| serde_json::to_writer_pretty(w, &ran).map_err(Into::into))?;
         Ok(Some(ran))
     }
@@ -233,14 +240,14 @@ impl<'a> Runner<'a> {
 }
 
 /// The results of a point from an earlier study of the same case.
-fn found(folder: &Path, loaded: &Loaded, flags: &str) -> Result<Option<Ran>> {
+fn found(folder: &Path, loaded: &Loaded) -> Result<Option<Ran>> {
     let (ran, case) = (folder.join(RAN), folder.join(CASE));
     if !ran.is_file() || !case.is_file() {
         return Ok(None);
     }
     let same = differences(&through_text(&value(loaded)?), &parse::file(&case)?, &|_| false).is_empty();
     let ran: Option<Ran> = serde_json::from_value(parse::file(&ran)?).ok();
-    Ok(ran.filter(|ran| same && ran.flags == flags))
+    Ok(ran.filter(|_| same))
 }
 
 fn impossible(error: &Error) -> Ran {
@@ -248,6 +255,7 @@ fn impossible(error: &Error) -> Ran {
         ended: "impossible".into(),
         message: error.to_string(),
         flags: String::new(),
+        base: String::new(),
         wall_s: 0.0,
         work: 0.0,
         tightening: 0.0,

@@ -2,6 +2,7 @@
 //! told in steps of that scene. What slows both down drops out.
 
 use crate::case::read::read;
+use crate::case::steps::Precision;
 use crate::error::{Error, Result};
 use crate::run;
 use crate::simulate::{Make, Simulation};
@@ -13,6 +14,8 @@ const TIMED: f64 = 64.0;
 const WARM: f64 = 16.0;
 /// Time of a run between two timings, over the time that one takes.
 const SELDOM: u32 = 10;
+/// Steps until the scene has changed.
+const MOST_STEPS: f64 = 1e8;
 
 /// A scene to time beside a run, and what has been measured of the run.
 pub(super) struct Stopwatch {
@@ -30,15 +33,20 @@ pub(super) struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// The scene is the case, held as it is built.
+    /// The scene is the case in f32, with a first load step that is so long that it stays nearly as it is built.
     ///
     /// # Errors
     /// A case that cannot be run.
     pub(super) fn new(case: &Path, sets: &[String], threads: Option<usize>) -> Result<Self> {
-        let hold =
-            ["steps=[{\"hold\":{\"time_s\":1}}]", "integration.energy_tolerance=100", "integration.precision=f32"];
-        let sets = [sets, &hold.map(String::from)].concat();
-        let scene = run::simulation(&read(case, &sets)?, Make { threads: threads.unwrap_or(0), ..Make::default() })?;
+        let mut loaded = read(case, sets)?;
+        let integration = &mut loaded.case.integration;
+        let longest = (MOST_STEPS * integration.dt_s.unwrap_or(integration.dt_max_s)).min(1.0);
+        integration.precision = Precision::F32;
+        (integration.energy_tolerance, integration.penetration_tolerance) = (100.0, 100.0);
+        if let Some(first) = loaded.case.steps.first_mut() {
+            *first.time_mut() = longest;
+        }
+        let scene = run::simulation(&loaded, Make { threads: threads.unwrap_or(0), ..Make::default() })?;
         let now = Instant::now();
         let mut stopwatch =
             Self { scene, pace: 0.0, cost: Duration::ZERO, mark: now, work: 0.0, wall: 0.0, fault: None };
