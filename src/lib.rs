@@ -49,7 +49,7 @@
 //! | [`output`] | frames, tables, maps, pictures, pages, checkpoints |
 //! | [`simulate`] | a scene in time: steps, contact searches, energies, guards |
 //! | [`run`] | a case with its files: what the program calls |
-//! | [`study`] | many runs at once: tables over a folder of scenes, how results differ |
+//! | [`study`] | many runs at once: tables over a folder of scenes, how results differ, what accuracy costs |
 //!
 //! Imports point one way: a module knows only those before it in this list (`tests/structure.rs` checks it).
 //! ```text
@@ -65,6 +65,7 @@
 //! - **An effect**: a flag in [`plan::Active`] that says what in a case calls for it, a const flag of the kernels it changes and the same
 //!   name for `#if` in their twins, a name and how to turn it off in [`run::effects`], a scene with and without it in `tests/effects.rs`.
 //! - **A measure**: a file in `measure`, from [`mesh::Mesh`] and [`mesh::frame::Frame`]; a column in [`output::table`].
+//! - **A knob of accuracy**: a row in [`study::accuracy::turns`].
 //! - **A scene**: a JSON file in `cases/`. `tricot schema` lists every field.
 
 pub mod backend;

@@ -54,6 +54,17 @@ impl Step {
         }
     }
 
+    /// Duration in s, to be changed.
+    pub fn time_mut(&mut self) -> &mut f64 {
+        match self {
+            Step::Settle { time_s }
+            | Step::Pretension { time_s }
+            | Step::Hold { time_s }
+            | Step::Shear { time_s, .. }
+            | Step::Move { time_s } => time_s,
+        }
+    }
+
     /// Name as the user writes it.
     pub fn name(&self) -> &'static str {
         match self {

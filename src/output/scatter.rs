@@ -36,6 +36,8 @@ const KEY: f64 = 712.0;
 const LINE: f64 = 15.0;
 const BELOW: f64 = 48.0;
 const COLOURS: [&str; 8] = ["#1b5e8c", "#c2571a", "#3f7d3a", "#7a4b94", "#a8324a", "#0f7f7a", "#8a6d1f", "#555b63"];
+/// A level below the lowest point by more than this factor is only named.
+const FAR: f64 = 10.0;
 const INK: &str = "#23262b";
 /// Size of a digit of a number beside its mark, and distances at which it is tried.
 const DIGIT: [f64; 2] = [6.4, 10.0];
@@ -51,6 +53,9 @@ impl Scatter<'_> {
         let marks: Vec<&Mark> = self.marks.iter().filter(|m| positive(&m.at)).collect();
         marks.first()?;
         let lines: Vec<&(f64, String)> = self.lines.iter().filter(|l| l.0.is_finite() && l.0 > 0.0).collect();
+        // a level far below all points would squeeze them
+        let lowest = marks.iter().map(|m| m.at[1]).fold(f64::MAX, f64::min);
+        let (lines, far): (Vec<_>, Vec<_>) = lines.into_iter().partition(|l| l.0 > lowest / FAR);
         let levels = lines.iter().map(|l| l.0);
         let xs = ticks(marks.iter().map(|m| m.at[0]));
         let ys = ticks(marks.iter().map(|m| m.at[1]).chain(levels));
@@ -92,6 +97,9 @@ impl Scatter<'_> {
             text(&mut t, [right - 4.0, at - 5.0], "end", 11, name);
             let half = 3.2 * name.chars().count() as f64;
             taken.push([[right - 4.0 - half, at - 9.0], [half, 6.0]]);
+        }
+        for (line, (_, name)) in far.into_iter().enumerate() {
+            text(&mut t, [right - 4.0, bottom - 6.0 - LINE * line as f64], "end", 11, &format!("{name}, below"));
         }
         let joined: Vec<String> =
             self.front.iter().filter(|p| positive(p)).map(|p| format!("{:.1} {:.1}", x(p[0]), y(p[1]))).collect();
@@ -204,6 +212,8 @@ mod tests {
         assert_eq!(svg.matches("<title>a &lt; b</title>").count(), 4);
         assert!(svg.contains("by chance") && !svg.contains("none<"));
         assert_eq!(svg.matches("stroke-width=\"1.3\"").count(), 1);
+        let far = Scatter { lines: vec![(0.01, "by chance".to_owned())], ..chart.clone() }.svg().unwrap();
+        assert!(far.contains("by chance, below") && !far.contains("dasharray") && svg.contains("dasharray"));
         assert!(Scatter { marks: vec![mark(1, [0.0, 1.0])], ..chart }.svg().is_none());
     }
 

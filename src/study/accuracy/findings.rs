@@ -63,12 +63,10 @@ impl Findings {
                 [from(&own, &reference), from(&own, &itself)]
             })
             .collect();
-        let unit = rows.first().map(|row| [row.ran.work, row.ran.tightening]).unwrap_or([f64::NAN; 2]);
+        let unit = rows.first().map(|row| row.ran.clone());
         for (row, [errors, changes]) in rows.iter_mut().zip(compared) {
             (row.errors, row.changes) = (errors, changes);
-            if row.ran.finished() {
-                row.time = (row.ran.work + if row.ran.from_state { unit[1] } else { 0.0 }) / unit[0];
-            }
+            row.time = unit.as_ref().map_or(f64::NAN, |unit| row.ran.over(unit));
         }
         let mut findings = Self { measures, chance, rows };
         for row in findings.front() {

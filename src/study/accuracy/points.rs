@@ -1,7 +1,7 @@
 //! The points of a study: which case each of them is, where its results are, and how it is run or found again.
 
 use super::Options;
-use super::stopwatch::Stopwatch;
+use super::stopwatch::{Clocks, Stopwatch};
 use super::turns::{CHANCE, Flags, REFERENCE, Turn, chosen};
 use crate::backend::gpu;
 use crate::case::differences::differences;
@@ -48,6 +48,11 @@ pub struct Point {
 }
 
 impl Point {
+    /// Whether threads or device are its knob.
+    fn has_own_machine(&self) -> bool {
+        self.flags.threads.is_some() || self.flags.machine.is_some()
+    }
+
     /// Its folder among those of the points.
     pub fn folder(&self) -> String {
         let letters = self.label.chars().map(|c| match c {
@@ -69,11 +74,15 @@ pub struct Ran {
     pub message: String,
     /// Options of `tricot run` behind the name of the case, besides those of the study.
     pub flags: String,
+    /// What the study runs on.
+    pub base: String,
     /// Time without what the stopwatch took, s.
-    pub wall_s: f64,
+    pub seconds: Clocks,
     /// That in steps of the stopwatch's scene, all of it and until the end of tightening.
-    pub work: f64,
-    pub tightening: f64,
+    pub work: Clocks,
+    pub tightening: Clocks,
+    /// Whether it runs on the threads of the default and on no device, so that the time of processors tells its cost.
+    pub by_processors: bool,
     /// Whether it started from the tightened state of the case.
     pub from_state: bool,
 }
@@ -87,6 +96,9 @@ pub(super) struct Runner<'a> {
     default: Value,
     /// Load steps before the first shear or move.
     phases: usize,
+    /// Whether there is a GPU worth a point, and whether points run on one unless told otherwise.
+    has_gpu: bool,
+    on_gpu: bool,
     stopwatch: Stopwatch,
 }
 
@@ -98,7 +110,9 @@ impl<'a> Runner<'a> {
         let loads = |step: &Step| matches!(step, Step::Shear { .. } | Step::Move { .. });
         let phases = loaded.case.steps.iter().position(loads).unwrap_or(loaded.case.steps.len());
         let stopwatch = Stopwatch::new(case, sets, options.threads)?;
-        Ok(Self { case, sets, options, default: value(&loaded)?, phases, stopwatch })
+        let has_gpu = gpu::devices().first().is_some_and(|d| d.is_discrete);
+        let on_gpu = options.machine == Machine::Gpu || options.machine == Machine::Auto && has_gpu;
+        Ok(Self { case, sets, options, default: value(&loaded)?, phases, has_gpu, on_gpu, stopwatch })
     }
 
     /// The points, in the order in which they are run: those that the others are compared with come first.
@@ -115,13 +129,11 @@ impl<'a> Runner<'a> {
             let role = if turn.knob == REFERENCE.knob { Role::Check } else { Role::Turned };
             point(role, turn)
         });
-        let device = self.options.machine != Machine::Cpu && gpu::devices().first().is_some_and(|d| d.is_discrete);
-        let on_gpu = device || self.options.machine == Machine::Gpu;
         let differs = |p: &Point| {
             let same_threads = p.flags.threads.is_some() && p.flags.threads == self.options.threads;
             let same_machine = match p.flags.machine {
-                Some(Machine::Gpu) => true,
-                Some(_) => !on_gpu,
+                Some(Machine::Gpu) => self.on_gpu || !self.has_gpu,
+                Some(_) => !self.on_gpu,
                 None => false,
             };
             !same_threads && !same_machine
@@ -154,13 +166,18 @@ impl<'a> Runner<'a> {
             sets.push(STATES.into());
         }
         let loaded = match read(self.case, &sets) {
-            Err(error @ (Error::Case { .. } | Error::Geometry { .. })) => return Ok(Some(impossible(&error))),
+            Err(error) if is_impossible(&error) => return Ok(Some(impossible(&error))),
             loaded => loaded?,
         };
         let from = self.state(point, &loaded)?;
         let flags = self.flags(point, from.as_deref());
         let folder = self.folder(point);
-        if let Some(ran) = found(&folder, &loaded, &flags)? {
+        let base = format!(
+            "{:?}, {} threads",
+            self.options.machine,
+            self.options.threads.map_or("all".into(), |n| n.to_string())
+        );
+        if let Some(ran) = found(&folder, &loaded)?.filter(|ran| ran.flags == flags && ran.base == base) {
             return Ok(Some(ran));
         }
         let f64_on_gpu = loaded.case.integration.precision == Precision::F64 && self.options.machine == Machine::Gpu;
@@ -177,7 +194,7 @@ impl<'a> Runner<'a> {
             quiet: true,
         };
         let tightened = if from.is_some() { 0 } else { self.phases * loaded.case.output.rows_per_step };
-        let (mut rows, mut tightening) = (0, 0.0);
+        let (mut rows, mut tightening) = (0, Clocks::default());
         let stopwatch = &mut self.stopwatch;
         stopwatch.start();
         let outcome = run::run_watched(&loaded, &options, &mut || {
@@ -189,23 +206,24 @@ impl<'a> Runner<'a> {
             tightening = stopwatch.work();
             spent
         });
-        let [work, wall_s] = stopwatch.stop()?;
+        let [work, seconds] = stopwatch.stop()?;
         let (ended, message) = match outcome {
             Ok(outcome) if outcome.interrupted => return Ok(None),
             Ok(_) => ("finished".to_owned(), String::new()),
             Err(Error::Guard(guard)) => (guard.cause.clone(), guard.to_string()),
-            Err(error @ Error::Geometry { .. }) => return Ok(Some(impossible(&error))),
+            Err(error) if is_impossible(&error) => return Ok(Some(impossible(&error))),
             Err(error) => return Err(error),
         };
-        let ran = Ran { ended, message, flags, wall_s, work, tightening, from_state: from.is_some() };
+        let by_processors = !self.on_gpu && !point.has_own_machine();
+        let from_state = from.is_some();
+        let ran = Ran { ended, message, flags, base, seconds, work, tightening, by_processors, from_state };
         file::replace(&folder.join(RAN), |w| serde_json::to_writer_pretty(w, &ran).map_err(Into::into))?;
         Ok(Some(ran))
     }
 
     /// The state of the tightened case, for a point that only differs in what comes later.
     fn state(&self, point: &Point, loaded: &Loaded) -> Result<Option<PathBuf>> {
-        let own_machine = point.flags.threads.is_some() || point.flags.machine.is_some();
-        if point.role != Role::Turned || own_machine || self.phases == 0 {
+        if point.role != Role::Turned || point.has_own_machine() || self.phases == 0 {
             return Ok(None);
         }
         let case = value(loaded)?;
@@ -233,14 +251,19 @@ impl<'a> Runner<'a> {
 }
 
 /// The results of a point from an earlier study of the same case.
-fn found(folder: &Path, loaded: &Loaded, flags: &str) -> Result<Option<Ran>> {
+fn found(folder: &Path, loaded: &Loaded) -> Result<Option<Ran>> {
     let (ran, case) = (folder.join(RAN), folder.join(CASE));
     if !ran.is_file() || !case.is_file() {
         return Ok(None);
     }
     let same = differences(&through_text(&value(loaded)?), &parse::file(&case)?, &|_| false).is_empty();
     let ran: Option<Ran> = serde_json::from_value(parse::file(&ran)?).ok();
-    Ok(ran.filter(|ran| same && ran.flags == flags))
+    Ok(ran.filter(|_| same))
+}
+
+/// Whether there is no such case: a mesh too coarse to be built, say.
+fn is_impossible(error: &Error) -> bool {
+    matches!(error, Error::Case { .. } | Error::Geometry { .. })
 }
 
 fn impossible(error: &Error) -> Ran {
@@ -248,9 +271,11 @@ fn impossible(error: &Error) -> Ran {
         ended: "impossible".into(),
         message: error.to_string(),
         flags: String::new(),
-        wall_s: 0.0,
-        work: 0.0,
-        tightening: 0.0,
+        base: String::new(),
+        seconds: Clocks::default(),
+        work: Clocks::default(),
+        tightening: Clocks::default(),
+        by_processors: false,
         from_state: false,
     }
 }
@@ -264,8 +289,15 @@ impl Ran {
         self.ended == "finished"
     }
 
+    /// Its time over that of another run, by the clock that tells; NaN if it did not finish.
+    pub(super) fn over(&self, other: &Self) -> f64 {
+        let clock = |clocks: Clocks| if self.by_processors { clocks.cpu } else { clocks.wall };
+        let before = if self.from_state { clock(other.tightening) } else { 0.0 };
+        if self.finished() { (clock(self.work) + before) / clock(other.work) } else { f64::NAN }
+    }
+
     /// For programs.
     pub(super) fn json(&self) -> Value {
-        json!({ "ended": self.ended, "message": self.message, "flags": self.flags, "wall_s": self.wall_s })
+        json!({ "ended": self.ended, "message": self.message, "flags": self.flags, "seconds": self.seconds })
     }
 }

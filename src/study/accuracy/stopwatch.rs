@@ -1,10 +1,13 @@
 //! Time on a machine that has other work to do: beside a run, at short intervals, the same small scene is timed, and the run is
-//! told in steps of that scene. What slows both down drops out.
+//! told in steps of that scene. What slows both down drops out. Time that the processors give to others is not counted at all by the
+//! second clock.
 
 use crate::case::read::read;
+use crate::case::steps::Precision;
 use crate::error::{Error, Result};
 use crate::run;
 use crate::simulate::{Make, Simulation};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -12,36 +15,88 @@ use std::time::{Duration, Instant};
 const TIMED: f64 = 64.0;
 const WARM: f64 = 16.0;
 /// Time of a run between two timings, over the time that one takes.
-const SELDOM: u32 = 10;
+const SELDOM: f64 = 10.0;
+/// Steps until the scene has changed.
+const MOST_STEPS: f64 = 1e8;
+
+/// Two clocks: of the wall, and of the time that the processors have given to this process.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Clocks {
+    pub wall: f64,
+    pub cpu: f64,
+}
+
+impl Clocks {
+    /// Both clocks now, s, from a common moment.
+    fn now(start: Instant) -> Self {
+        let wall = start.elapsed().as_secs_f64();
+        Self { wall, cpu: cpu_time().unwrap_or(wall) }
+    }
+
+    fn with(self, other: Self, both: impl Fn(f64, f64) -> f64) -> Self {
+        Self { wall: both(self.wall, other.wall), cpu: both(self.cpu, other.cpu) }
+    }
+
+    fn since(self, before: Self) -> Self {
+        self.with(before, |now, before| now - before)
+    }
+}
+
+/// Time that this process has had on all processors, s, where the system tells.
+#[cfg(unix)]
+fn cpu_time() -> Option<f64> {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: the pointer is to a value of the type that is asked for.
+    let failed = unsafe { libc::clock_gettime(libc::CLOCK_PROCESS_CPUTIME_ID, &mut time) };
+    (failed == 0).then_some(time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64)
+}
+
+#[cfg(not(unix))]
+fn cpu_time() -> Option<f64> {
+    None
+}
 
 /// A scene to time beside a run, and what has been measured of the run.
 pub(super) struct Stopwatch {
     scene: Simulation,
+    start: Instant,
     /// Seconds of a step of the scene, when last timed.
-    pace: f64,
+    pace: Clocks,
     /// The time that the last timing took.
     cost: Duration,
     /// When the last timing ended.
-    mark: Instant,
+    mark: Clocks,
     /// Time of the run so far: in steps of the scene, and in s.
-    work: f64,
-    wall: f64,
+    work: Clocks,
+    spent: Clocks,
     fault: Option<Error>,
 }
 
 impl Stopwatch {
-    /// The scene is the case, held as it is built.
+    /// The scene is the case in f32, with a first load step that is so long that it stays nearly as it is built.
     ///
     /// # Errors
     /// A case that cannot be run.
     pub(super) fn new(case: &Path, sets: &[String], threads: Option<usize>) -> Result<Self> {
-        let hold =
-            ["steps=[{\"hold\":{\"time_s\":1}}]", "integration.energy_tolerance=100", "integration.precision=f32"];
-        let sets = [sets, &hold.map(String::from)].concat();
-        let scene = run::simulation(&read(case, &sets)?, Make { threads: threads.unwrap_or(0), ..Make::default() })?;
-        let now = Instant::now();
-        let mut stopwatch =
-            Self { scene, pace: 0.0, cost: Duration::ZERO, mark: now, work: 0.0, wall: 0.0, fault: None };
+        let mut loaded = read(case, sets)?;
+        let integration = &mut loaded.case.integration;
+        let longest = (MOST_STEPS * integration.dt_s.unwrap_or(integration.dt_max_s)).min(1.0);
+        integration.precision = Precision::F32;
+        (integration.energy_tolerance, integration.penetration_tolerance) = (100.0, 100.0);
+        if let Some(first) = loaded.case.steps.first_mut() {
+            *first.time_mut() = longest;
+        }
+        let scene = run::simulation(&loaded, Make { threads: threads.unwrap_or(0), ..Make::default() })?;
+        let mut stopwatch = Self {
+            scene,
+            start: Instant::now(),
+            pace: Clocks::default(),
+            cost: Duration::ZERO,
+            mark: Clocks::default(),
+            work: Clocks::default(),
+            spent: Clocks::default(),
+            fault: None,
+        };
         stopwatch.scene.advance(0.0, |_| false)?;
         Ok(stopwatch)
     }
@@ -49,25 +104,27 @@ impl Stopwatch {
     /// A run starts.
     pub(super) fn start(&mut self) {
         self.measure();
-        (self.work, self.wall) = (0.0, 0.0);
+        (self.work, self.spent) = (Clocks::default(), Clocks::default());
     }
 
     /// Times the scene if that is due; returns the time it took.
     pub(super) fn tick(&mut self) -> Duration {
-        if self.mark.elapsed() < SELDOM * self.cost { Duration::ZERO } else { self.lap() }
+        let span = self.start.elapsed().as_secs_f64() - self.mark.wall;
+        if span < SELDOM * self.cost.as_secs_f64() { Duration::ZERO } else { self.lap() }
     }
 
     /// Times the scene now; returns the time it took.
     pub(super) fn lap(&mut self) -> Duration {
-        let (span, before) = (self.mark.elapsed().as_secs_f64(), self.pace);
+        let (span, before) = (Clocks::now(self.start).since(self.mark), self.pace);
         self.measure();
-        self.work += span / (0.5 * (before + self.pace));
-        self.wall += span;
+        let pace = before.with(self.pace, |before, after| 0.5 * (before + after));
+        self.work = self.work.with(span.with(pace, |span, pace| span / pace), |sum, more| sum + more);
+        self.spent = self.spent.with(span, |sum, more| sum + more);
         self.cost
     }
 
     /// Time of the run until the last lap, in steps of the scene.
-    pub(super) fn work(&self) -> f64 {
+    pub(super) fn work(&self) -> Clocks {
         self.work
     }
 
@@ -75,23 +132,24 @@ impl Stopwatch {
     ///
     /// # Errors
     /// What went wrong in the scene meanwhile.
-    pub(super) fn stop(&mut self) -> Result<[f64; 2]> {
+    pub(super) fn stop(&mut self) -> Result<[Clocks; 2]> {
         self.lap();
-        self.fault.take().map_or(Ok([self.work, self.wall]), Err)
+        self.fault.take().map_or(Ok([self.work, self.spent]), Err)
     }
 
     fn measure(&mut self) {
         let started = Instant::now();
         let advanced = self.advance(WARM).and_then(|_| {
-            let (timed, steps) = (Instant::now(), self.advance(TIMED)?);
-            Ok(timed.elapsed().as_secs_f64() / steps)
+            let (before, steps) = (Clocks::now(self.start), self.advance(TIMED)?);
+            let span = Clocks::now(self.start).since(before);
+            Ok(Clocks { wall: span.wall / steps, cpu: span.cpu / steps })
         });
         match advanced {
             Ok(pace) => self.pace = pace,
             Err(error) => self.fault = Some(error),
         }
-        self.mark = Instant::now();
-        self.cost = self.mark - started;
+        self.cost = started.elapsed();
+        self.mark = Clocks::now(self.start);
     }
 
     /// Some steps of the scene; returns how many.
@@ -99,5 +157,26 @@ impl Stopwatch {
         let before = self.scene.step();
         self.scene.advance(self.scene.time() + steps * self.scene.dt(), |_| false)?;
         Ok((self.scene.step() - before).max(1) as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn a_process_that_sleeps_has_no_processor() {
+        let start = Instant::now();
+        let before = Clocks::now(start);
+        std::thread::sleep(Duration::from_millis(200));
+        let slept = Clocks::now(start).since(before);
+        assert!(slept.wall >= 0.2, "{slept:?}");
+        let mut sum = 0u64;
+        let busy = Clocks::now(start);
+        while Clocks::now(start).since(busy).cpu < 0.05 {
+            sum = std::hint::black_box(sum + 1);
+        }
+        assert!(Clocks::now(start).since(busy).cpu >= 0.05 && sum > 0);
     }
 }

@@ -41,8 +41,17 @@ impl Report<'_> {
     fn table(&self, path: &Path) -> Result<()> {
         let f = self.findings;
         let names: Vec<String> = f.measures.iter().map(|m| m.name.to_lowercase().replace(' ', "_")).collect();
-        let columns =
-            ["number", "point", "knob", "ended", "steps", "wall_s", "time_over_default", "energy_balance_error"];
+        let columns = [
+            "number",
+            "point",
+            "knob",
+            "ended",
+            "steps",
+            "wall_s",
+            "cpu_s",
+            "time_over_default",
+            "energy_balance_error",
+        ];
         let mut header = columns.map(String::from).to_vec();
         header.extend(names.iter().map(|name| format!("error_{name}")));
         header.extend(names.iter().map(|name| format!("change_{name}")));
@@ -60,7 +69,14 @@ impl Report<'_> {
             let mut cells: Vec<Cell> = vec![(number as f64).into(), row.point.label.into(), row.point.knob.into()];
             cells.push(row.ran.ended.as_str().into());
             cells.extend(
-                [row.number("steps"), row.ran.wall_s, row.time, row.number("worst_energy_balance")].map(Cell::from),
+                [
+                    row.number("steps"),
+                    row.ran.seconds.wall,
+                    row.ran.seconds.cpu,
+                    row.time,
+                    row.number("worst_energy_balance"),
+                ]
+                .map(Cell::from),
             );
             cells.extend(texts.iter().map(|text| Cell::Name(text)));
             if !names.is_empty() {
@@ -120,9 +136,9 @@ impl Report<'_> {
         let front = f.rows.iter().filter(|row| measure == 0 && row.front);
         let mut front: Vec<[f64; 2]> = front.filter_map(|row| Some([row.time, 100.0 * f.claim(row, 0)?.0])).collect();
         front.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let mut lines = vec![(100.0 * f.chance[measure], "by chance".to_owned())];
+        let mut lines = vec![(100.0 * f.chance[measure], format!("by chance: {:.3} %", 100.0 * f.chance[measure]))];
         if let Some((error, _)) = f.row(Role::Check).and_then(|row| f.claim(row, measure)) {
-            lines.push((100.0 * error, "finer reference".to_owned()));
+            lines.push((100.0 * error, format!("finer reference: {:.3} %", 100.0 * error)));
         }
         Scatter { axes: ["time over that of the default", &format!("error of {name}, %")], marks, front, lines }.svg()
     }
@@ -130,7 +146,7 @@ impl Report<'_> {
     fn page(&self) -> String {
         let f = self.findings;
         let mut page = Page::new(&format!("What accuracy costs: {}", self.title));
-        let wall = |role: Role| f.row(role).map_or("–".into(), |row| format!("{:.1} s", row.ran.wall_s));
+        let wall = |role: Role| f.row(role).map_or("–".into(), |row| format!("{:.1} s", row.ran.seconds.wall));
         let [low, high] = f.repeated();
         let check = f.row(Role::Check).and_then(|row| f.claim(row, 0));
         page.facts(&[
@@ -166,7 +182,7 @@ impl Report<'_> {
             let mut cells = vec![
                 format!("{number} {}{}", row.point.label, if row.front { " ◂" } else { "" }),
                 row.number("steps").to_string(),
-                format!("{:.1}", row.ran.wall_s),
+                format!("{:.1}", row.ran.seconds.wall),
                 time,
             ];
             cells.extend((0..f.measures.len()).map(|k| error(f, row, k)));
@@ -182,7 +198,11 @@ impl Report<'_> {
             .collect();
         page.heading("Points");
         page.table(&header, &f.rows.iter().enumerate().map(cells).collect::<Vec<_>>());
-        let text = format!("Errors in %, as in the charts; ◂ marks the front. The options go behind: {}", self.command);
+        let text = format!(
+            "Errors in %, as in the charts; ◂ marks the front. Time is over that of the default: of processors where a point has the \
+             same threads, of the wall elsewhere. The options go behind: {}",
+            self.command
+        );
         page.paragraph("soft", &text);
     }
 
@@ -209,7 +229,7 @@ impl Report<'_> {
         // writing to a String does not fail
         for row in &f.rows {
             let time = if row.ran.finished() { format!("{:.3}", row.time) } else { row.ran.ended.clone() };
-            let (label, steps, wall) = (row.point.label, row.number("steps"), row.ran.wall_s);
+            let (label, steps, wall) = (row.point.label, row.number("steps"), row.ran.seconds.wall);
             let errors = columns(&mut shown.iter().map(|k| error(f, row, *k)));
             let front = if row.front { " ◂" } else { "" };
             let _ = writeln!(t, "{label:<22} {steps:>8} {wall:>8.1} {time:>8}{errors}{front}");
