@@ -26,6 +26,7 @@ use crate::materials::charmetant::Charmetant;
 use crate::materials::neo_hookean::NeoHookean;
 use crate::materials::{Law, Material};
 use crate::mesh::Mesh;
+use crate::mesh::centre::centred;
 use bytemuck::Pod;
 use conditions::Conditions;
 use solids::Solids;
@@ -183,6 +184,9 @@ fn own(planes: usize, stride: usize) -> Access {
 /// # Errors
 /// Geometry that cannot be run: inverted elements, conditions without nodes.
 pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Result<Model> {
+    // boxes of conditions and clamps are where the user said
+    let conditions = Conditions::new(case, mesh)?;
+    let mesh = &*centred(mesh);
     let effects = &case.effects;
     let periodic = mesh.period.is_some();
     let nodes = mesh.nodes.len();
@@ -190,7 +194,6 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let solids = Solids::new(mesh)?;
     let threads = Threads::new(mesh, effects.bending);
     let (hexes, beams, bends) = (solids.headers.len(), threads.thread.len(), threads.pairs.len() / 2);
-    let conditions = Conditions::new(case, mesh)?;
     let first_thread = first as u32;
 
     let mut b = Builder::default();
