@@ -277,6 +277,7 @@ impl Simulation {
         self.dt = self.share * self.case.integration.dt_s.unwrap_or(self.case.integration.dt_max_s);
         self.dt_before = self.dt;
         self.search()?;
+        self.bend_at_rest();
         let totals = self.diagnose()?;
         self.guard_step()?;
         self.choose_dt();

@@ -61,7 +61,7 @@ impl Mutator {
         ((self.0.draw() * 0.5 + 0.5) * n as f64) as usize % n.max(1)
     }
 
-    /// Bytes with some changes; `other` gives parts.
+    /// Bytes with some changes of any kind; `other` gives parts.
     fn change(&mut self, bytes: &[u8], other: &[u8]) -> Vec<u8> {
         let mut bytes = bytes.to_vec();
         for _ in 0..1 + self.below(3) {
@@ -86,6 +86,27 @@ impl Mutator {
                 }
                 _ => self.token(&mut bytes, at),
             }
+        }
+        bytes
+    }
+
+    /// Bytes of JSON with some numbers changed to others: most of them still make a case.
+    fn renumber(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let mut bytes = bytes.to_vec();
+        for _ in 0..1 + self.below(3) {
+            let part = |b: &u8| b.is_ascii_digit() || b"+-.eE".contains(b);
+            let starts = |i: usize| part(&bytes[i]) && b" :[,\n".contains(&bytes[i.max(1) - 1]);
+            let at = self.below(bytes.len());
+            let Some(start) = (at..bytes.len()).find(|i| starts(*i)) else { continue };
+            let end = (start..bytes.len()).find(|i| !part(&bytes[*i])).unwrap_or(bytes.len());
+            let Ok(number) = String::from_utf8_lossy(&bytes[start..end]).parse::<f64>() else { continue };
+            let other = match self.below(4) {
+                0 => number * (1.0 + 0.1 * self.0.draw()),
+                1 => number * 10f64.powi(self.below(5) as i32 - 2),
+                2 => number + self.0.draw(),
+                _ => (number + self.0.draw() * 2.0).round(),
+            };
+            bytes.splice(start..end, other.to_string().into_bytes());
         }
         bytes
     }
@@ -154,7 +175,7 @@ fn small(loaded: &Loaded) -> bool {
 
 #[test]
 fn cases() {
-    let (count, seed) = (number("TRICOT_FUZZ", 6000), number("TRICOT_SEED", 1));
+    let (count, seed) = (number("TRICOT_FUZZ", 4000), number("TRICOT_SEED", 1));
     let corpus = corpus();
     let mut mutator = Mutator(Random(seed));
     let folder = tempfile::tempdir().unwrap();
@@ -163,7 +184,7 @@ fn cases() {
     for round in 0..count {
         let (_, original) = &corpus[mutator.below(corpus.len())];
         let (_, other) = &corpus[mutator.below(corpus.len())];
-        let bytes = mutator.change(original, other);
+        let bytes = if round % 2 == 0 { mutator.renumber(original) } else { mutator.change(original, other) };
         let file = folder.path().join(format!("case-{round}.json"));
         fs::write(&file, &bytes).unwrap();
         match calmly("the reader", &bytes, || read(&file, &[])) {
@@ -190,7 +211,7 @@ fn cases() {
     }
     let wall = started.elapsed().as_secs_f64();
     println!("{count} cases of seed {seed}: {accepted} accepted, {built} built, {ran} ran for a window; {wall:.1} s");
-    assert!(accepted * 50 > count && built > 0 && ran > 0, "mutations that nothing survives test the parser only");
+    assert!(accepted * 20 > count && built > 0 && ran > 0, "mutations that nothing survives test the parser only");
 }
 
 /// A block on a spring of contact: a run of some dozen steps with a checkpoint.
@@ -232,7 +253,7 @@ fn sealed(line: &[u8], packed: Option<&[u8]>, payload: &[u8]) -> Vec<u8> {
 
 #[test]
 fn checkpoints() {
-    let (count, seed) = (number("TRICOT_FUZZ", 3000), number("TRICOT_SEED", 1));
+    let (count, seed) = (number("TRICOT_FUZZ", 1200), number("TRICOT_SEED", 1));
     let folder = tempfile::tempdir().unwrap();
     let case = folder.path().join("case.json");
     fs::write(&case, tiny().to_string()).unwrap();

@@ -29,7 +29,15 @@ const STEPS: u64 = 2000;
 const NUMBERS: usize = 39;
 
 /// Shrunk failures, by what was wrong with them.
-const REGRESSIONS: [(&str, [f64; NUMBERS]); 0] = [];
+const REGRESSIONS: [(&str, [f64; NUMBERS]); 1] =
+    [("threads that are not at rest as they are generated start with bending energy", only(9, 0.7))];
+
+/// The shipped fabric but for one number.
+const fn only(at: usize, value: f64) -> [f64; NUMBERS] {
+    let mut numbers = [0.0; NUMBERS];
+    numbers[at] = value;
+    numbers
+}
 
 type Numbers = Vec<f64>;
 
@@ -46,8 +54,8 @@ impl Draw<'_> {
         let value = middle + x.abs() * if x < 0.0 { low - middle } else { high - middle };
         (value * 1e6).round() / 1e6
     }
-    fn whole(&mut self, low: f64, middle: f64, high: f64) -> f64 {
-        self.between(low, middle, high).round()
+    fn whole(&mut self, low: f64, middle: f64, high: f64) -> u64 {
+        self.between(low, middle, high).round() as u64
     }
     fn yes(&mut self) -> bool {
         self.next() > 0.5
@@ -161,10 +169,16 @@ fn simulation(loaded: &Loaded, mesh: Mesh, precision: Precision) -> Result<Simul
 fn accepted(case: &Value) -> Option<(Loaded, Mesh)> {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), case.to_string()).unwrap();
-    let loaded = read(file.path(), &[]).ok()?;
-    let mesh = fabric::build(&loaded.case, loaded.fabric.as_ref()).ok()?;
-    simulation(&loaded, mesh.clone(), Precision::F32).ok()?;
-    Some((loaded, mesh))
+    let built = read(file.path(), &[]).and_then(|loaded| {
+        let mesh = fabric::build(&loaded.case, loaded.fabric.as_ref())?;
+        simulation(&loaded, mesh.clone(), Precision::F32)?;
+        Ok((loaded, mesh))
+    });
+    if let Err(error) = &built {
+        let message = error.to_string();
+        println!("refused: {}", message.split_once(": ").map_or(message.as_str(), |(_, what)| what));
+    }
+    built.ok()
 }
 
 /// Goes on to the last step; the work of the thermal strain, taken from the tensions that the host sees between windows.
@@ -293,12 +307,12 @@ fn examine(numbers: &[f64], margins: &mut Margins) -> Option<End> {
     let scale = e.output().max(1e-6);
     let [yarns, stretching] = energies(&s);
     let ledger = e.elongation + e.compaction + e.distortion + e.shear;
-    margins.hold("strain energy of yarns", (yarns - ledger).abs() / scale, 1e-3, &mut broken);
-    margins.hold("strain energy of threads", (stretching - e.axial).abs() / scale, 1e-3, &mut broken);
+    margins.hold("strain energy of yarns", (yarns - ledger).abs() / scale, 1e-5, &mut broken);
+    margins.hold("strain energy of threads", (stretching - e.axial).abs() / scale, 2e-3, &mut broken);
     let (velocities, masses) = (s.velocities(), s.model.mass.clone());
     let pairs = || velocities.iter().zip(&masses);
     let kinetic: f64 = pairs().map(|(v, m)| 0.5 * m * dot(*v, *v)).sum();
-    margins.hold("kinetic energy", (kinetic - e.kinetic).abs() / scale, 1e-3, &mut broken);
+    margins.hold("kinetic energy", (kinetic - e.kinetic).abs() / scale, 1e-5, &mut broken);
     margins.hold("thermal work", (thermal - e.thermal).abs() / scale, 0.05, &mut broken);
     let stored = yarns + stretching + e.bending + e.contact + kinetic;
     let lost = e.friction + e.contact_damping + e.damping;
@@ -308,8 +322,8 @@ fn examine(numbers: &[f64], margins: &mut Margins) -> Option<End> {
     let sum = pairs().fold([0.0; 3], |sum, (v, m)| [0, 1, 2].map(|k| sum[k] + m * v[k]));
     let size: f64 = pairs().map(|(v, m)| m * norm(*v)).sum();
     match loaded.case.effects.contact_mass {
-        None => margins.hold("momentum", norm(sum) / size, 1e-3, &mut broken),
-        Some(_) => margins.hold("momentum with added mass", norm(sum) / size, 0.3, &mut broken),
+        None => margins.hold("momentum", norm(sum) / size, 1e-5, &mut broken),
+        Some(_) => margins.hold("momentum with added mass", norm(sum) / size, 0.2, &mut broken),
     }
 
     let mut copy = simulation(&sheared_back(&loaded), mirrored(&mesh), Precision::F32).unwrap();
@@ -323,9 +337,9 @@ fn examine(numbers: &[f64], margins: &mut Margins) -> Option<End> {
                 &mut broken,
             );
             margins.hold("mirrored friction", (other.friction - e.friction).abs() / scale, 0.02, &mut broken);
-            let mean = |s: &Simulation| s.tensions().iter().sum::<f64>() / s.tensions().len() as f64;
+            let mean = |s: &Simulation| s.tensions().iter().map(|n| n.abs()).sum::<f64>() / s.tensions().len() as f64;
             let (a, b) = (mean(&s), mean(&copy));
-            margins.hold("mirrored mean tension", (a - b).abs() / a.abs().max(1e-2), 0.02, &mut broken);
+            margins.hold("mirrored mean tension", (a - b).abs() / a.max(1e-2), 0.02, &mut broken);
         }
         Err(error) => broken.push(format!("the mirrored copy is stopped: {error}")),
     }

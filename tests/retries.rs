@@ -21,13 +21,15 @@ fn fall(dt: f64, retries: usize) -> Value {
         bare(),
         &[
             ("/domain/mesh/blocks", json!([low, high])),
-            ("/domain/mesh/conditions", json!([{ "within": [[0, 0, 0], [1, 1, 0]] }])),
             ("/effects/contact", json!({ "yarn_penalty_n_mm3": 20_000 })),
-            ("/steps", json!([{ "hold": { "time_s": 5e-4 } }, { "hold": { "time_s": 1.5e-3 } }])),
-            ("/integration", json!({ "dt_s": dt, "retries": retries, "penetration_tolerance": 100 })),
+            ("/steps", json!([{ "hold": { "time_s": 5e-4 } }, { "hold": { "time_s": 7e-4 } }])),
+            (
+                "/integration",
+                json!({ "dt_s": dt, "retries": retries, "penetration_tolerance": 100, "energy_tolerance": 0.2 }),
+            ),
             (
                 "/output",
-                json!({ "rows_per_step": 12, "frames_per_step": 2, "pictures": false, "checkpoint_wall_s": 0 }),
+                json!({ "rows_per_step": 12, "frames_per_step": 2, "pictures": false, "checkpoint_wall_s": 0.02 }),
             ),
         ],
     )
@@ -71,7 +73,7 @@ fn too_long_a_step_is_rescued_in_a_reproducible_way() {
     assert!(time.len() == 24 && time.windows(2).all(|t| t[0] < t[1]) && step.windows(2).all(|s| s[0] < s[1]));
     assert!((retries[0], dt[0]) == (0.0, TOO_LONG), "the part before is kept");
     assert_eq!((*retries.last().unwrap(), *dt.last().unwrap()), (guards.len() as f64, share * TOO_LONG));
-    assert!(column(&dir, "e_balance_error").iter().all(|e| e.abs() < 0.1));
+    assert!(column(&dir, "e_balance_error").iter().all(|e| e.abs() < 0.2));
 
     ran(folder, "again", &[]);
     same(folder, "whole", "again");
@@ -105,6 +107,7 @@ fn retries_run_out() {
     let text = failed(&program(folder, "stopped", &[]).output().unwrap(), 3);
     println!("{text}");
     assert!(text.contains("time step guard at step 0 ") && text.contains("1.250e-5 s is longer"), "{text}");
+    assert!(text.contains(" 2 times the estimated limit"));
     assert!(text.trim_end().ends_with("(2 retries with shorter steps did not help)"), "{text}");
     let found = summary(&folder.join("stopped"));
     assert_eq!(found["retries"].as_array().unwrap().len(), 2);
@@ -119,5 +122,5 @@ fn a_study_goes_back_like_a_run() {
     let (seen, _) = scenes.examine(&folder.path().join("case.json"), &[]).unwrap();
     println!("{} steps, {} retries, balance {:.2e}", seen.steps, seen.retries, seen.balance);
     assert_eq!(seen.verdict, Verdict::Finished, "{}", seen.message);
-    assert!(seen.retries > 0 && seen.balance < 0.1 && seen.dt < TOO_LONG);
+    assert!(seen.retries > 0 && seen.balance < 0.2 && seen.dt < TOO_LONG);
 }

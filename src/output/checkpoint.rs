@@ -135,6 +135,10 @@ impl Checkpoint {
         };
         let records = [part(header.records[0])?, part(header.records[1])?];
         let buffers = header.buffers.iter().map(|(_, len)| part(*len)).collect::<Result<_>>()?;
+        // the end of the stream, with its own check
+        if !matches!(rest.read(&mut [0]), Ok(0)) {
+            return Err(damaged());
+        }
         Ok(Self { header, records, buffers })
     }
 }
