@@ -7,11 +7,13 @@
 mod guards;
 mod ledger;
 mod limit;
+mod retry;
 mod snapshot;
 mod state;
 
 pub use ledger::Energies;
 pub use limit::Limit;
+pub use retry::Retries;
 
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
@@ -85,6 +87,8 @@ pub struct Simulation {
     step: u64,
     dt: f64,
     dt_before: f64,
+    /// Factor on the time step: below one in a run that has gone back.
+    share: f64,
     searches: u64,
     /// Largest speed of a node after the last burst, mm/s.
     speed: f64,
@@ -187,6 +191,7 @@ impl Simulation {
             step: 0,
             dt: 0.0,
             dt_before: 0.0,
+            share: 1.0,
             searches: 0,
             speed: 1e9,
             burst: BURST,
@@ -211,6 +216,10 @@ impl Simulation {
     /// The current time step, s.
     pub fn dt(&self) -> f64 {
         self.dt
+    }
+    /// Factor on the time step: below one in a run that has gone back.
+    pub fn share(&self) -> f64 {
+        self.share
     }
     /// Contact searches so far.
     pub fn searches(&self) -> u64 {
@@ -271,9 +280,10 @@ impl Simulation {
     /// First search, first energies, first time step.
     fn begin(&mut self) -> Result<()> {
         self.ready = true;
-        self.dt = self.case.integration.dt_s.unwrap_or(self.case.integration.dt_max_s);
+        self.dt = self.share * self.case.integration.dt_s.unwrap_or(self.case.integration.dt_max_s);
         self.dt_before = self.dt;
         self.search()?;
+        self.bend_at_rest();
         let totals = self.diagnose()?;
         self.guard_step()?;
         self.choose_dt();
@@ -467,11 +477,11 @@ impl Simulation {
     fn choose_dt(&mut self) {
         let integration = &self.case.integration;
         if let Some(dt) = integration.dt_s {
-            self.dt = dt;
+            self.dt = self.share * dt;
             return;
         }
         let settled = FIRST_SHARE + (1.0 - FIRST_SHARE) * (self.time / FIRST_TIME).min(1.0);
-        let aim = (integration.safety * self.health.dt_limit).min(integration.dt_max_s) * settled;
+        let aim = (integration.safety * self.health.dt_limit).min(integration.dt_max_s) * settled * self.share;
         // upwards by little, downwards at once
         self.dt = if self.step == 0 { aim } else { aim.min(1.05 * self.dt) };
     }

@@ -2,28 +2,16 @@
 
 mod common;
 
-use common::{advance, bare, block, coarse_cell, loaded, neo_hookean, with};
+use common::program::{can_resume, contents, failed, folder, hash, kill_after, program, ran, same};
+use common::{advance, bare, block, loaded, neo_hookean, short_cell, with};
 use serde_json::{Value, json};
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 use std::time::Duration;
-use tempfile::TempDir;
 use tricot::case::steps::Precision;
 use tricot::fabric;
 use tricot::plan::Capacity;
 use tricot::simulate::{Make, Simulation};
-
-/// The coarse cell with a hold, frames and frequent checkpoints.
-fn cell() -> Value {
-    let steps = json!([
-        { "pretension": { "time_s": 1.5e-4 } },
-        { "hold": { "time_s": 2e-5 } },
-        { "shear": { "angle_deg": 3, "time_s": 1e-4 } }
-    ]);
-    let output = json!({ "rows_per_step": 6, "frames_at_deg": [1, 2], "pictures": false, "checkpoint_wall_s": 0.02 });
-    with(coarse_cell(), &[("/steps", steps), ("/output", output)])
-}
 
 /// Blocks that are pushed onto each other, slide and fall.
 fn blocks() -> Value {
@@ -59,9 +47,9 @@ fn simulation(case: &Value, make: Make, capacity: Capacity) -> Simulation {
 fn a_restored_scene_goes_on_to_the_same_bits() {
     let tight = Capacity { cell: 12, slots: 2, beam_slots: 2 };
     for (case, precision, capacity, end) in [
-        (cell(), Precision::F32, Capacity::default(), 2.5e-4),
-        (cell(), Precision::F32, tight, 2.5e-4),
-        (cell(), Precision::F64, Capacity::default(), 2.5e-4),
+        (short_cell(), Precision::F32, Capacity::default(), 2.5e-4),
+        (short_cell(), Precision::F32, tight, 2.5e-4),
+        (short_cell(), Precision::F64, Capacity::default(), 2.5e-4),
         (blocks(), Precision::F32, Capacity::default(), 1e-4),
     ] {
         let make = Make { precision, threads: 1, ..Make::default() };
@@ -91,105 +79,31 @@ fn a_restored_scene_goes_on_to_the_same_bits() {
         assert_eq!((whole.take_stress(), whole.reactions()), (other.take_stress(), other.reactions()));
         assert_eq!(format!("{:?}", whole.frame()), format!("{:?}", other.frame()));
 
-        let finer = with(cell(), &[("/resolution/slice_mm", json!(0.7))]);
+        let finer = with(short_cell(), &[("/resolution/slice_mm", json!(0.7))]);
         let error = simulation(&finer, make, Capacity::default()).restore(host, &sizes, &contents).unwrap_err();
         assert!(error.to_string().contains("bytes here, but"), "{error}");
     }
 }
 
-/// A folder with the case of [`cell`].
-fn folder() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cell.json"), cell().to_string()).unwrap();
-    folder
-}
-
-/// The program on that case.
-fn program(folder: &Path, output: &str, more: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tricot"));
-    command.args(["run", "--quiet", "--threads", "1", "-o"]).arg(folder.join(output)).arg(folder.join("cell.json"));
-    command.args(more);
-    command
-}
-
-fn ran(folder: &Path, output: &str, more: &[&str]) {
-    let output = program(folder, output, more).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-}
-
-#[track_caller]
-fn refused(output: &Output) -> String {
-    let text = String::from_utf8(output.stderr.clone()).unwrap();
-    assert_eq!(output.status.code(), Some(4), "{text}");
-    assert_eq!(text.lines().count(), 1, "{text}");
-    text
-}
-
-/// Every file below a folder with its bytes.
-fn contents(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let mut found = Vec::new();
-    for entry in fs::read_dir(dir).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            found.extend(contents(&path));
-        } else {
-            found.push((path.clone(), fs::read(&path).unwrap()));
-        }
-    }
-    found.sort();
-    found
-}
-
-/// Everything that does not speak of wall time: names and bytes.
-fn results(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let timed = |path: &Path| path.starts_with("state") || path == Path::new("summary.json");
-    let files = contents(dir).into_iter().map(|(path, bytes)| (path.strip_prefix(dir).unwrap().to_path_buf(), bytes));
-    files.filter(|(path, _)| !timed(path)).collect()
-}
-
-fn hash(dir: &Path) -> String {
-    let summary: Value = serde_json::from_slice(&fs::read(dir.join("summary.json")).unwrap()).unwrap();
-    assert_eq!(summary["verdict"], "finished");
-    summary["state_hash"].as_str().unwrap().to_owned()
-}
-
-#[track_caller]
-fn same(folder: &Path, a: &str, b: &str) {
-    let [a, b] = [a, b].map(|name| folder.join(name));
-    let (first, second) = (results(&a), results(&b));
-    let names = |files: &[(PathBuf, Vec<u8>)]| files.iter().map(|(path, _)| path.clone()).collect::<Vec<_>>();
-    assert_eq!(names(&first), names(&second));
-    for ((path, a), (_, b)) in first.iter().zip(&second) {
-        assert!(a == b, "{} differs", path.display());
-    }
-    assert_eq!(hash(&a), hash(&b));
-}
-
 #[cfg(unix)]
 #[test]
 fn a_run_killed_at_any_moment_goes_on_to_the_same_files() {
-    let folder = folder();
+    let folder = folder(&short_cell());
     let folder = folder.path();
     ran(folder, "whole", &[]);
     let mut kills = 0;
     for (round, wait) in [30, 45, 60, 80, 110, 150].into_iter().enumerate() {
         let output = format!("killed-{round}");
-        let state = folder.join(&output).join("state");
         let mut resume: &[&str] = &[];
         for attempt in 0..200 {
-            let mut child = program(folder, &output, resume).spawn().unwrap();
+            let child = program(folder, &output, resume).spawn().unwrap();
             // a run that has no checkpoint yet is no case for --resume
-            while !state.is_dir()
-                || fs::read_dir(&state).unwrap().all(|f| f.unwrap().path().extension().unwrap() != "state")
-            {
+            while !can_resume(&folder.join(&output)) {
                 std::thread::sleep(Duration::from_millis(2));
             }
-            std::thread::sleep(Duration::from_millis(wait * (1 + attempt)));
-            if child.try_wait().unwrap().is_none() {
-                child.kill().unwrap();
-                kills += 1;
-            }
-            if child.wait().unwrap().success() {
+            let (killed, ended) = kill_after(child, Duration::from_millis(wait * (1 + attempt)));
+            kills += u32::from(killed);
+            if ended {
                 break;
             }
             resume = &["--resume"];
@@ -203,10 +117,10 @@ fn a_run_killed_at_any_moment_goes_on_to_the_same_files() {
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_goes_on_to_the_same_files() {
-    let folder = folder();
+    let folder = folder(&short_cell());
     let folder = folder.path();
     ran(folder, "whole", &[]);
-    let mut child = program(folder, "stopped", &[]).stdout(std::process::Stdio::null()).spawn().unwrap();
+    let mut child = program(folder, "stopped", &[]).spawn().unwrap();
     let rows = || fs::read_to_string(folder.join("stopped/history.csv")).map_or(0, |t| t.lines().count());
     while rows() < 3 {
         std::thread::sleep(Duration::from_millis(2));
@@ -222,9 +136,9 @@ fn an_interrupted_run_goes_on_to_the_same_files() {
 
 #[test]
 fn what_cannot_be_resumed_is_named_and_nothing_is_touched() {
-    let folder = folder();
+    let folder = folder(&short_cell());
     let folder = folder.path();
-    let fails = |output: &str, more: &[&str]| refused(&program(folder, output, more).output().unwrap());
+    let fails = |output: &str, more: &[&str]| failed(&program(folder, output, more).output().unwrap(), 4);
     assert!(fails("none", &["--resume"]).contains("no checkpoint in state/"));
     ran(folder, "cell", &[]);
     let dir = folder.join("cell");
@@ -262,7 +176,7 @@ fn what_cannot_be_resumed_is_named_and_nothing_is_touched() {
 
 #[test]
 fn a_study_starts_from_the_end_of_a_load_step() {
-    let folder = folder();
+    let folder = folder(&short_cell());
     let folder = folder.path();
     ran(folder, "first", &[]);
     let states = contents(&folder.join("first/state"));
@@ -280,7 +194,7 @@ fn a_study_starts_from_the_end_of_a_load_step() {
     // later steps may change, what made the state may not
     ran(folder, "other", &["--from", hold, "--set", "steps.2.shear.angle_deg=-2", "--set", "title=other"]);
     assert!(rows("other", "history.csv").last().unwrap().contains(",shear,"));
-    let fails = |more: &[&str]| refused(&program(folder, "bad", more).output().unwrap());
+    let fails = |more: &[&str]| failed(&program(folder, "bad", more).output().unwrap(), 4);
     let text = fails(&["--from", hold, "--set", "steps.1.hold.time_s=1e-5"]);
     assert!(text.contains("steps.1.hold.time_s is 0.00001, but 0.00002 in the checkpoint"), "{text}");
     assert!(fails(&["--from", named("-3-shear.state")]).contains("behind all of them"));

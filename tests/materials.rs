@@ -52,6 +52,7 @@ fn px35(cap: f64) -> Parameters {
 fn bits<M: Material, R: Real>(isa: Isa, parameters: &Parameters, states: &[Tensor<f64>]) -> Vec<u64> {
     struct Batch<'a, M, R>(&'a Parameters, &'a [Tensor<f64>], &'a mut Vec<R>, PhantomData<M>);
     impl<M: Material, R: Real> Work<R> for Batch<'_, M, R> {
+        const WIDE: bool = true;
         fn run<L: Lane<Scalar = R>>(self) {
             let parameters = self.0.map(L::new);
             for states in self.1.chunks_exact(L::WIDTH) {

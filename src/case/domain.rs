@@ -115,7 +115,8 @@ impl Specimen {
     }
 }
 
-/// Blocks of hexahedra and threads of beams, given node by node.
+/// Blocks of hexahedra and threads of beams, given node by node. A scene beyond ±250 mm is computed about its middle; it may be
+/// 499 mm long along every axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InlineMesh {
@@ -147,11 +148,11 @@ pub struct InlineBlock {
     /// Opposite corners of a straight block `[[x, y, z], [x, y, z]]`, mm: fibres along x, columns along y, layers along z.
     /// Give either this or `nodes`.
     #[serde(default)]
-    #[schemars(inner(inner(range(min = -250, max = 250))))]
+    #[schemars(inner(inner(range(min = -1e6, max = 1e6))))]
     pub corners: Option<[[f64; 3]; 2]>,
     /// Every node, mm, slices fastest, then columns, then layers.
     #[serde(default)]
-    #[schemars(inner(inner(range(min = -250, max = 250))))]
+    #[schemars(inner(inner(range(min = -1e6, max = 1e6))))]
     pub nodes: Option<Vec<[f64; 3]>>,
     /// Fibre direction. Default `[1, 0, 0]`.
     #[serde(default = "fibre")]
@@ -180,7 +181,7 @@ pub struct InlineThread {
     #[schemars(length(min = 1, max = 100))]
     pub name: String,
     /// Nodes in order, mm; at least 2.
-    #[schemars(length(min = 2, max = 10_000_000), inner(inner(range(min = -250, max = 250))))]
+    #[schemars(length(min = 2, max = 10_000_000), inner(inner(range(min = -1e6, max = 1e6))))]
     pub nodes: Vec<[f64; 3]>,
     /// Radius for contact, mm.
     #[schemars(range(min = 0.001, max = 50))]

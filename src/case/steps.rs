@@ -104,6 +104,10 @@ pub struct Integration {
     /// Penetration at which the run stops, as a share of the thread radius (threads) or yarn thickness (yarns). Default 0.5.
     #[schemars(range(min = 0.01, max = 100))]
     pub penetration_tolerance: f64,
+    /// How often a run that a guard stops goes back to an earlier state, 1000 steps or more before where there are so many, and
+    /// goes on from there with half the time step. With 0 the guard stops it. Default 0.
+    #[schemars(range(min = 0, max = 20))]
+    pub retries: usize,
     /// Offset of one node by so many position quanta (2⁻²³ mm) at the start: measures how far runs scatter by chance. Default 0.
     #[schemars(range(min = -8_388_608, max = 8_388_608))]
     pub perturbation_quanta: i32,
@@ -127,6 +131,7 @@ impl Default for Integration {
             hourglass: 1.0,
             energy_tolerance: 0.1,
             penetration_tolerance: 0.5,
+            retries: 0,
             perturbation_quanta: 0,
         }
     }

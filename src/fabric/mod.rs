@@ -13,11 +13,11 @@ use crate::case::domain::Domain;
 use crate::case::fabric::Fabric;
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
+use crate::mesh::centre::{self, REACH};
+use crate::mesh::vector::add;
 
 /// Positions are kept in whole quanta of 2⁻²³ mm, which reach ±256 mm.
 const QUANTA_PER_MM: f64 = 8_388_608.0;
-/// Largest coordinate, mm: leaves room for displacements.
-const REACH: f64 = 250.0;
 /// Largest number of nodes.
 const MOST_NODES: f64 = 1e8;
 
@@ -31,12 +31,13 @@ pub fn build(case: &Case, fabric: Option<&Fabric>) -> Result<Mesh> {
         Domain::Specimen(specimen) => specimen::build(case, needed("specimen")?, specimen)?,
         Domain::Mesh(inline) => inline::build(inline)?,
     };
+    let shift = centre::shift(&mesh);
     for (node, position) in mesh.nodes.iter().enumerate() {
-        if position.iter().any(|x| x.abs() > REACH) {
+        if add(*position, shift).iter().any(|x| x.abs() > REACH) {
             return Err(Error::geometry(
                 "domain",
                 format!(
-                    "node {node} lies at {position:?} mm, but coordinates must stay within ±{REACH} mm; make the domain smaller or move it towards the origin"
+                    "node {node} lies at {position:?} mm, but nodes must stay within ±{REACH} mm of the middle of the scene; make the domain smaller"
                 ),
             ));
         }

@@ -29,15 +29,31 @@ impl Record {
         !self.short && self.at == Some(self.bytes.len())
     }
 
+    /// Bytes of any number, or as many as there are behind the end of what can be read.
+    pub fn bytes(&mut self, value: &mut Vec<u8>) {
+        let mut count = value.len();
+        count.record(self);
+        match &mut self.at {
+            None => self.bytes.extend(value.iter()),
+            Some(at) => {
+                let end = at.saturating_add(count);
+                self.short |= end > self.bytes.len();
+                *value = self.bytes.get(*at..end.min(self.bytes.len())).unwrap_or_default().to_vec();
+                *at = end;
+            }
+        }
+    }
+
     /// Eight bytes from or to a field; zero behind the end of what can be read.
     fn word(&mut self, value: &mut u64) {
         match &mut self.at {
             None => self.bytes.extend(value.to_le_bytes()),
             Some(at) => {
-                let bytes = self.bytes.get(*at..*at + 8).and_then(|b| b.try_into().ok());
+                let end = at.saturating_add(8);
+                let bytes = self.bytes.get(*at..end).and_then(|b| b.try_into().ok());
                 self.short |= bytes.is_none();
                 *value = bytes.map_or(0, u64::from_le_bytes);
-                *at += 8;
+                *at = end;
             }
         }
     }
@@ -59,6 +75,14 @@ impl Recorded for f64 {
         let mut bits = self.to_bits();
         bits.record(record);
         *self = f64::from_bits(bits);
+    }
+}
+
+impl Recorded for bool {
+    fn record(&mut self, record: &mut Record) {
+        let mut word = u64::from(*self);
+        word.record(record);
+        *self = word != 0;
     }
 }
 
@@ -140,6 +164,23 @@ mod tests {
         read.record(&mut again);
         assert_eq!(again.into_bytes(), bytes);
         assert_eq!(read.1.1, values.1.1);
+    }
+
+    #[test]
+    fn bytes_read_back_and_a_count_that_is_too_large_is_noticed() {
+        let mut record = Record::new();
+        record.bytes(&mut vec![1, 2, 3]);
+        true.record(&mut record);
+        let written = record.into_bytes();
+        let (mut bytes, mut flag) = (Vec::new(), false);
+        let mut record = Record::read(written.clone());
+        record.bytes(&mut bytes);
+        flag.record(&mut record);
+        assert!(record.complete() && flag && bytes == [1, 2, 3]);
+        let mut record = Record::read([&u64::MAX.to_le_bytes(), &written[8..]].concat());
+        record.bytes(&mut bytes);
+        flag.record(&mut record);
+        assert!(!record.complete());
     }
 
     #[test]

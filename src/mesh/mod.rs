@@ -3,6 +3,7 @@
 
 use crate::case::fabric::Material;
 
+pub mod centre;
 pub mod clearance;
 pub mod export;
 pub mod frame;

@@ -23,7 +23,7 @@ pub const FOLDER: &str = "state";
 /// Checkpoints that stay, besides those from the end of a load step.
 const KEPT: usize = 2;
 const EXTENSION: &str = "state";
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// What a state belongs to, and how it is laid out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -87,8 +87,9 @@ impl Checkpoint {
         let path = folder.join(format!("{:012}{name}.{EXTENSION}", self.header.step));
         file::replace(&path, |w| w.write_all(&bytes))?;
         file::settle(&folder)?;
-        let mut passing: Vec<PathBuf> = list(results)?.into_iter().filter(|p| is_passing(p)).collect();
-        passing.truncate(passing.len().saturating_sub(KEPT));
+        // a run that has gone back writes in front of its old ones
+        let mut passing: Vec<PathBuf> = list(results)?.into_iter().filter(|p| is_passing(p) && *p != path).collect();
+        passing.truncate(passing.len().saturating_sub(KEPT - usize::from(is_passing(&path))));
         passing.iter().try_for_each(|old| fs::remove_file(old).map_err(|e| Error::file(old, reason(&e))))
     }
 
@@ -128,11 +129,17 @@ impl Checkpoint {
         }
         let mut rest = ZlibDecoder::new(&body[line + 1..]);
         let mut part = |len: usize| {
-            let mut part = vec![0; len];
-            rest.read_exact(&mut part).map(|()| part).map_err(|_| damaged())
+            // a length that is not true asks for no more than there is
+            let mut part = Vec::new();
+            let read = rest.by_ref().take(len as u64).read_to_end(&mut part);
+            if read.is_ok_and(|read| read == len) { Ok(part) } else { Err(damaged()) }
         };
         let records = [part(header.records[0])?, part(header.records[1])?];
         let buffers = header.buffers.iter().map(|(_, len)| part(*len)).collect::<Result<_>>()?;
+        // the end of the stream, with its own check
+        if !matches!(rest.read(&mut [0]), Ok(0)) {
+            return Err(damaged());
+        }
         Ok(Self { header, records, buffers })
     }
 }
@@ -154,6 +161,19 @@ fn list(results: &Path) -> Result<Vec<PathBuf>> {
     let step = |path: &PathBuf| path.file_name().map(|name| name.as_encoded_bytes()[..12.min(name.len())].to_vec());
     found.sort_by_key(|path| (step(path), !is_passing(path)));
     Ok(found)
+}
+
+/// Removes the checkpoints behind a time step, from which a run has gone back.
+pub fn remove_after(results: &Path, step: u64) -> Result<()> {
+    let later = |path: &PathBuf| {
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        name.get(..12).and_then(|digits| digits.parse::<u64>().ok()).is_some_and(|number| number > step)
+    };
+    let found = if results.join(FOLDER).is_dir() { list(results)? } else { Vec::new() };
+    found
+        .iter()
+        .filter(|path| later(path))
+        .try_for_each(|old| fs::remove_file(old).map_err(|e| Error::file(old, reason(&e))))
 }
 
 /// Whether a checkpoint is not from the end of a load step.

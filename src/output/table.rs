@@ -23,6 +23,7 @@ pub const HISTORY: &[&str] = &[
     "e_balance_error",
     "max_penetration_mm",
     "min_jacobian",
+    "retries",
 ];
 
 /// Columns of `contacts.csv`: nodes and beams that touch, deepest penetration since the row before, mass added by contact over
@@ -194,6 +195,11 @@ impl Table {
         let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(|e| Error::file(path, e))?;
         let len = file.seek(SeekFrom::End(0)).map_err(|e| Error::file(path, e))?;
         Ok(Self { path: path.to_path_buf(), file, columns, line: String::new(), len })
+    }
+
+    /// Bytes so far.
+    pub fn written(&self) -> u64 {
+        self.len
     }
 
     /// Bytes so far, all of them on the disk.

@@ -30,6 +30,7 @@ use crate::kernel::buffer::{Buffer, Description, Initial, Kind};
 use crate::kernel::position::quanta;
 use crate::kernel::stage::{Access, Code, Kernel, Plan, Stage, flagged};
 use crate::mesh::Mesh;
+use crate::mesh::centre::centred;
 use bytemuck::Pod;
 use conditions::Conditions;
 use contact::ContactScene;
@@ -94,6 +95,7 @@ pub struct Buffers {
     pub status: Buffer,
     pub hex_energy: Option<Buffer>,
     pub beam_tension: Option<Buffer>,
+    pub bend_energy: Option<Buffer>,
     pub contact_force: Option<Buffer>,
     pub contact_stiffness: Option<Buffer>,
     pub contact_sums: Option<Buffer>,
@@ -213,6 +215,9 @@ fn own(planes: usize, stride: usize) -> Access {
 /// # Errors
 /// Geometry that cannot be run: inverted elements, conditions without nodes.
 pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Result<Model> {
+    // boxes of conditions and clamps are where the user said
+    let conditions = Conditions::new(case, mesh)?;
+    let mesh = &*centred(mesh);
     let effects = &case.effects;
     let line_groups = effects.fibre_lines.as_ref().map_or_else(Vec::new, |lines| line_groups(mesh, lines.threads));
     let ties = effects.contact.as_ref().map_or_else(Ties::default, |contact| Ties::new(case, mesh, contact));
@@ -224,7 +229,6 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let solids = Solids::new(mesh, hourglass)?;
     let threads = Threads::new(mesh, active.bending);
     let (hexes, beams, bends) = (solids.headers.len(), threads.thread.len(), threads.pairs.len() / 2);
-    let conditions = Conditions::new(case, mesh)?;
     let first_thread = first as u32;
 
     let mut b = Builder::default();
@@ -473,6 +477,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             status: status_,
             hex_energy: hex.energy,
             beam_tension,
+            bend_energy: bent.as_ref().map(|bent| bent.energy),
             contact_force: contact.as_ref().map(|c| c.force),
             contact_stiffness: contact.as_ref().map(|c| c.stiffness),
             contact_sums: faces.map(|f| f.sums),

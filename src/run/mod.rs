@@ -34,7 +34,7 @@ use crate::output::checkpoint::Checkpoint;
 use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH};
 use crate::output::{directory, file, vtu};
 use crate::schedule::Load;
-use crate::simulate::{Make, Simulation};
+use crate::simulate::{Make, Retries, Simulation};
 use crossings::Crossed;
 use indicatif::{ProgressBar, ProgressStyle};
 use picture::draw;
@@ -223,6 +223,8 @@ struct Run<'a> {
     largest_added: [f64; 2],
     dt_range: [f64; 2],
     place: Place,
+    /// States to go back to, each with the record of the run.
+    retries: Retries<Vec<u8>>,
     /// When the next checkpoint is due.
     due: Option<Instant>,
     /// Wall time of the runs that this one goes on from, s.
@@ -268,6 +270,7 @@ impl<'a> Run<'a> {
                 Domain::Specimen(specimen) => Some(Pulled::of(specimen, &simulation)),
                 _ => None,
             },
+            retries: Retries::of(&simulation),
             simulation,
             stopped,
             frames: Vec::new(),
@@ -286,11 +289,22 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// All load steps, or those that are left.
+    /// Everything that is left of the case, from an earlier state with shorter steps where a guard stops it and the case allows.
     fn go(&mut self, watch: &mut dyn FnMut() -> Duration) -> Result<()> {
+        loop {
+            match self.load_steps(watch) {
+                Err(Error::Guard(guard)) => self.go_back(guard)?,
+                result => return result,
+            }
+        }
+    }
+
+    /// All load steps, or those that are left.
+    fn load_steps(&mut self, watch: &mut dyn FnMut() -> Duration) -> Result<()> {
         let output = &self.loaded.case.output;
         let phases = self.simulation.schedule.phases().to_vec();
         let bar = self.bar();
+        self.keep();
         self.simulation.advance(0.0, |_| false)?;
         if self.frames.is_empty() {
             self.write_frame("start")?;
@@ -328,6 +342,9 @@ impl<'a> Run<'a> {
                 }
                 self.place.row = row;
                 let stopped = self.stopped.load(Ordering::Relaxed);
+                if arrived {
+                    self.keep();
+                }
                 if arrived && (stopped || self.is_due()) {
                     self.save(None)?;
                 }

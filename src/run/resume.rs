@@ -3,7 +3,7 @@
 use super::{Options, Place, Run};
 use crate::case::Case;
 use crate::case::steps::Step;
-use crate::error::{Error, Result};
+use crate::error::{Error, Guard, Result};
 use crate::kernel::record::{Record, Recorded};
 use crate::output::checkpoint::{self, Checkpoint};
 use crate::output::directory;
@@ -138,17 +138,21 @@ impl Run<'_> {
                 let mut lengths = Vec::new();
                 let mut record = Record::read(own);
                 self.record(&mut lengths, &mut record);
-                let mut tables = self.tables();
+                self.retries.record(&mut record, |own, record| record.bytes(own));
+                let tables = self.tables();
                 if !record.complete() || lengths.len() != tables.len() {
                     return Err(Error::file(&self.options.output, "its checkpoint was written for other tables"));
                 }
                 for (table, len) in tables.iter().zip(&lengths) {
                     table.check_length(*len)?;
                 }
-                for (table, len) in tables.iter_mut().zip(&lengths) {
-                    table.cut(*len)?;
+                let (case, Place { phase, row, .. }) = (&self.loaded.case, self.place);
+                if phase > case.steps.len() || row > case.output.rows_per_step {
+                    let message =
+                        format!("its checkpoint is at row {row} behind load step {phase}, which is in no run");
+                    return Err(Error::file(&self.options.output, message));
                 }
-                directory::tidy(&self.options.output, self.frames.len())?;
+                self.cut(&lengths)?;
             }
         }
         Ok(())
@@ -159,9 +163,15 @@ impl Run<'_> {
         if self.loaded.case.output.checkpoint_wall_s.is_none() {
             return Ok(());
         }
-        let mut lengths = self.tables().into_iter().map(Table::settled).collect::<Result<Vec<u64>>>()?;
+        let lengths = self.tables().into_iter().map(Table::settled).collect::<Result<Vec<u64>>>()?;
+        self.write_state(lengths, end)
+    }
+
+    /// Writes a checkpoint of a run whose tables have these lengths.
+    fn write_state(&mut self, mut lengths: Vec<u64>, end: Option<&str>) -> Result<()> {
         let mut record = Record::new();
         self.record(&mut lengths, &mut record);
+        self.retries.record(&mut record, |own, record| record.bytes(own));
         let (host, buffers) = self.simulation.snapshot();
         self.simulation.alive()?;
         let case = value(&self.loaded.case)?;
@@ -169,6 +179,39 @@ impl Run<'_> {
         Checkpoint::new(case, at, [host, record.into_bytes()], buffers).write(&self.options.output, end)?;
         self.wait();
         Ok(())
+    }
+
+    /// Keeps the state of now to go back to, if it is time for one.
+    pub(super) fn keep(&mut self) {
+        if self.retries.due(&self.simulation) {
+            let mut lengths = self.tables().into_iter().map(|table| table.written()).collect();
+            let mut record = Record::new();
+            self.record(&mut lengths, &mut record);
+            self.retries.keep(&mut self.simulation, record.into_bytes());
+        }
+    }
+
+    /// Goes back to an earlier state with its tables and frames, where a guard stopped the run. Whenever it is killed, the last
+    /// checkpoint and the tables fit together.
+    pub(super) fn go_back(&mut self, guard: Guard) -> Result<()> {
+        let wall = self.wall();
+        let said = guard.to_string();
+        let own = self.retries.go_back(&mut self.simulation, guard)?;
+        let mut lengths = Vec::new();
+        self.record(&mut lengths, &mut Record::read(own));
+        self.wall_before = wall;
+        self.bar().println(format!("{said}; back to step {} with shorter steps", self.simulation.step()));
+        if self.loaded.case.output.checkpoint_wall_s.is_some() {
+            self.write_state(lengths.clone(), None)?;
+            checkpoint::remove_after(&self.options.output, self.simulation.step())?;
+        }
+        self.cut(&lengths)
+    }
+
+    /// Removes rows and frames behind the state that the run goes on from.
+    fn cut(&mut self, lengths: &[u64]) -> Result<()> {
+        self.tables().into_iter().zip(lengths).try_for_each(|(table, len)| table.cut(*len))?;
+        directory::tidy(&self.options.output, self.frames.len())
     }
 
     /// Sets when the next checkpoint is due.

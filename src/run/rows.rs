@@ -147,6 +147,7 @@ impl Run<'_> {
             h.balance.into(),
             h.penetration.into_iter().fold(0.0, f64::max).into(),
             h.min_jacobian.into(),
+            (self.retries.guards().len() as f64).into(),
         ])?;
         let numbers: Vec<f64> = [time, degrees].into_iter().chain(e.columns().map(|(_, value)| value)).collect();
         self.energies.numbers(&numbers)?;

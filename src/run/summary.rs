@@ -39,6 +39,8 @@ impl Run<'_> {
             "dt_smallest_s": self.dt_range[0],
             "dt_largest_s": self.dt_range[1],
             "dt_limit_s": h.dt_limit,
+            "dt_share": s.share(),
+            "retries": self.retries.guards(),
             "contact_searches": s.searches(),
             "wall_s": self.wall(),
             "stage_wall_s": s.backend().timings().into_iter().map(|(name, t)| json!({"stage": name, "s": t})).collect::<Vec<_>>(),
@@ -85,6 +87,13 @@ impl Run<'_> {
             self.dt_range[1],
             s.searches()
         );
+        if let Some(guard) = self.retries.guards().last() {
+            let times = match self.retries.guards().len() {
+                1 => "once".to_owned(),
+                n => format!("{n} times"),
+            };
+            let _ = writeln!(t, "retries    went back {times}, steps {} of what they were; {guard}", s.share());
+        }
         if let Some(pulled) = &self.pulled {
             t.push_str(&pulled.lines());
         } else {

@@ -58,11 +58,12 @@ impl Simulation {
     pub(super) fn guard_step(&self) -> Result<()> {
         let limit = self.health.dt_limit;
         match self.case.integration.dt_s {
-            Some(dt) if dt > SURELY_UNSTABLE * limit => {
+            Some(_) if self.dt > SURELY_UNSTABLE * limit => {
                 let node = self.health.limiting_node;
                 let culprit = format!(
-                    "the step of {dt:.3e} s is longer than {SURELY_UNSTABLE} times the estimated limit of {limit:.3e} s, \
+                    "the step of {:.3e} s is longer than {SURELY_UNSTABLE} times the estimated limit of {limit:.3e} s, \
                      which node {node} ({}) sets",
+                    self.dt,
                     self.node_owner(node)
                 );
                 Err(self.guard("time step", culprit, "lower integration.dt_s, or leave it out"))

@@ -108,6 +108,15 @@ impl Simulation {
         Ok(self.model.totals.contact.iter().map(|sums| sums.of(&totals, penalty::SUM_ENERGY)).sum())
     }
 
+    /// Bending energy of threads that are not at rest as they are generated: their stage once, before the first step.
+    pub(super) fn bend_at_rest(&mut self) {
+        let Some(energy) = self.model.buffers.bend_energy else { return };
+        let bends = |stage: &&Stage| stage.writes.iter().any(|(buffer, _)| *buffer == energy);
+        let stages: Vec<Stage> = self.model.plan.step.iter().filter(bends).cloned().collect();
+        let row = self.schedule.row(self.time, self.dt, self.dt_before);
+        self.backend.run(&stages, &[row]);
+    }
+
     /// Adds the work that kernels summed since the last look.
     pub(super) fn add_work(&mut self, totals: &[f64]) {
         let places = &self.model.totals;

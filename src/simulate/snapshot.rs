@@ -1,11 +1,18 @@
 //! The whole state of a scene as bytes, and a scene that goes on from it to the same bits.
 
-use super::{Energies, Health, Simulation, StressMean};
+use super::{Energies, Health, Simulation, StressMean, WINDOW};
+use crate::contact::threads::MOST_PAIRS;
 use crate::error::{Error, Result};
 use crate::kernel::buffer::{Buffer, Initial};
 use crate::kernel::record::{Record, Recorded};
 use crate::plan::{self, Capacity};
 use crate::schedule::Load;
+
+/// Shortest and longest time step that a state may hold, s.
+const MIN_DT: f64 = 1e-15;
+const MAX_DT: f64 = 1e-2;
+/// Largest cells of the contact search that a state may hold.
+const LARGEST_CELL: usize = 1 << 16;
 
 /// Lists of a search, filled from nothing whenever there is one.
 const REBUILT: [&str; 2] = ["items of cells", "cells"];
@@ -81,6 +88,7 @@ impl Simulation {
             &mut self.time,
             &mut self.dt,
             &mut self.dt_before,
+            &mut self.share,
             &mut self.speed,
             &mut self.start_energy,
             &mut self.largest_flow,
@@ -92,6 +100,7 @@ impl Simulation {
         self.energies.record(record);
         self.health.record(record);
         self.stress.record(record);
+        self.ready.record(record);
     }
 
     /// State on the host and in every buffer that is no table. Take it where [`advance`](Self::advance) has returned.
@@ -104,7 +113,7 @@ impl Simulation {
         (record.into_bytes(), buffers)
     }
 
-    /// Replaces the state of a scene that has not begun by one from [`snapshot`](Self::snapshot).
+    /// Replaces the state of a scene by one from [`snapshot`](Self::snapshot).
     ///
     /// # Errors
     /// A state of another mesh, other effects or another precision; the message names the buffer.
@@ -112,15 +121,22 @@ impl Simulation {
         let mut record = Record::read(host);
         let mut capacity = Capacity::default();
         capacity.record(&mut record);
+        let Capacity { cell, slots, beam_slots } = capacity;
+        let sizes = [(cell, LARGEST_CELL), (slots, 16), (beam_slots, MOST_PAIRS)];
+        if sizes.into_iter().any(|(size, most)| size == 0 || size > most) {
+            return Err(Error::geometry("a damaged state", format!("its tables of contact have sizes {capacity:?}")));
+        }
         if capacity != self.capacity {
             self.model = plan::build(&self.case, self.friction, &self.mesh, capacity)?;
             self.backend = self.make.backend(&self.model)?;
             self.capacity = capacity;
+            // what is prescribed acts in a new backend, until the next burst looks at the time
+            self.holds = true;
         }
         let changing = self.changing();
         let own = changing.iter().map(|b| (self.model.plan.buffers[b.0].name, self.backend.bytes(*b).len()));
-        let (here, there) = (own.collect::<Vec<_>>(), buffers.iter().map(|(name, len)| (name.as_str(), *len)));
-        let there: Vec<_> = there.collect();
+        let there = buffers.iter().zip(contents).map(|((name, _), bytes)| (name.as_str(), bytes.len()));
+        let (here, there): (Vec<_>, Vec<_>) = (own.collect(), there.collect());
         if let Some(at) = (0..here.len().max(there.len())).find(|i| here.get(*i) != there.get(*i)) {
             let say =
                 |b: Option<&(&str, usize)>| b.map_or("none".into(), |(name, len)| format!("{name:?} of {len} bytes"));
@@ -131,11 +147,28 @@ impl Simulation {
         if !record.complete() {
             return Err(Error::geometry("a state of another scene", "its record on the host has another length"));
         }
+        self.check_record()?;
         for (buffer, bytes) in changing.into_iter().zip(contents) {
             self.backend.set_bytes(buffer, bytes);
         }
-        self.ready = true;
         Ok(())
+    }
+
+    /// Refuses a record with numbers that no run has: one could not go on from them, or never end.
+    fn check_record(&self) -> Result<()> {
+        let longest = [self.dt, self.dt_before].into_iter().fold(0.0, f64::max);
+        let step = |dt: f64| (MIN_DT..=MAX_DT).contains(&dt) || !self.ready && dt == 0.0;
+        let within = |holds: bool, what: &str, value: f64| {
+            let message = || format!("its {what} of {value:e} is that of no run");
+            if holds { Ok(()) } else { Err(Error::geometry("a damaged state", message())) }
+        };
+        within(self.time >= 0.0 && self.time <= self.schedule.end() + longest, "time", self.time)?;
+        within(step(self.dt), "time step", self.dt)?;
+        within(step(self.dt_before), "time step before", self.dt_before)?;
+        within(self.share > 0.0 && self.share <= 1.0, "factor on the time step", self.share)?;
+        within(self.speed >= 0.0, "speed", self.speed)?;
+        within((1..=WINDOW).contains(&self.burst), "burst", self.burst as f64)?;
+        within(self.step <= u64::MAX / 2, "number of steps", self.step as f64)
     }
 
     /// Buffers that hold more than constants: what persists, and what the last steps left for tables and frames.

@@ -6,7 +6,8 @@ use crate::case::read::read;
 use crate::error::{Error, Result};
 use crate::mesh::{Mesh, vector};
 use crate::run;
-use crate::simulate::{Energies, Make, Simulation};
+use crate::schedule::Phase;
+use crate::simulate::{Energies, Make, Retries, Simulation};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,8 @@ pub struct Observed {
     /// What the guard said; empty if the run finished.
     pub message: String,
     pub steps: u64,
+    /// How often the scene went back to go on with shorter steps.
+    pub retries: usize,
     /// Smallest step, and smallest estimated limit without factors, s.
     pub dt: f64,
     pub dt_limit: f64,
@@ -77,72 +80,121 @@ impl Scenes {
     }
 }
 
-/// Runs a simulation to its end or to a guard.
+/// Runs a simulation to its end or to a guard that stops it for good.
 fn observe(mut simulation: Simulation) -> Result<Observed> {
-    let mut seen = Observed {
-        verdict: Verdict::Finished,
-        message: String::new(),
-        steps: 0,
-        dt: f64::INFINITY,
-        dt_limit: f64::INFINITY,
-        balance: 0.0,
-        penetration: 0.0,
-        min_jacobian: f64::INFINITY,
-        energies: Energies::default(),
-        displacements: Vec::new(),
-        drift: 0.0,
-        thickness_ratio: f64::NAN,
-        tension: f64::NAN,
-        tension_ratio: f64::NAN,
-    };
-    let mut before = simulation.fluctuations();
-    if let Err(error) = simulation.advance(0.0, |_| false) {
-        seen.stop(error)?;
-        return Ok(seen);
-    }
-    let mut ledger = Ledger::new(simulation.energies());
-    let ends: Vec<f64> = simulation.schedule.phases().iter().map(|phase| phase.end).collect();
-    for end in ends {
-        before = simulation.fluctuations();
-        let result = simulation.advance(end, |s| {
-            seen.look(s);
-            ledger.look(s.energies());
-            false
-        });
-        if let Err(error) = result {
-            seen.stop(error)?;
-            seen.look(&simulation);
-            ledger.look(simulation.energies());
-            break;
+    let mut retries = Retries::of(&simulation);
+    let mut way = Way::default();
+    while way.phase < simulation.schedule.phases().len() {
+        if retries.due(&simulation) {
+            retries.keep(&mut simulation, way.clone());
+        }
+        match way.go(&mut simulation, &retries) {
+            Err(Error::Guard(guard)) => match retries.go_back(&mut simulation, guard) {
+                Ok(earlier) => way = earlier,
+                Err(error) => {
+                    way.look(&simulation);
+                    way.seen.stop(error)?;
+                    break;
+                }
+            },
+            result => result?,
         }
     }
+    let Way { mut seen, ledger, before, .. } = way;
+    seen.retries = retries.guards().len();
     seen.balance = ledger.error / ledger.largest;
     seen.end(&simulation, &before);
     simulation.alive()?;
     Ok(seen)
 }
 
+/// How far a scene has come, and what was seen on the way.
+#[derive(Debug, Clone, Default)]
+struct Way {
+    /// Load steps that are complete.
+    phase: usize,
+    seen: Observed,
+    ledger: Ledger,
+    /// Displacements when the present load step began.
+    before: Vec<[f64; 3]>,
+}
+
+impl Way {
+    /// Goes on to the end of the load step, or until there is a state to keep.
+    fn go(&mut self, simulation: &mut Simulation, retries: &Retries<Self>) -> Result<()> {
+        let Phase { start, end, .. } = simulation.schedule.phases()[self.phase];
+        if self.before.is_empty() {
+            self.before = simulation.fluctuations();
+        }
+        simulation.advance(start, |_| false)?;
+        self.ledger.look(simulation.energies());
+        simulation.advance(end, |s| {
+            self.look(s);
+            retries.due(s)
+        })?;
+        if simulation.time() >= end * (1.0 - 1e-12) {
+            self.phase += 1;
+            if self.phase < simulation.schedule.phases().len() {
+                self.before.clear();
+            }
+        }
+        Ok(())
+    }
+
+    fn look(&mut self, simulation: &Simulation) {
+        self.seen.look(simulation);
+        self.ledger.look(simulation.energies());
+    }
+}
+
 /// The balance of energies over a whole run: what is small beside the energy that a run has in the end is no error, however
 /// large it is beside what was there when it arose.
+#[derive(Debug, Clone)]
 struct Ledger {
-    start: f64,
+    /// What the first look finds, mJ.
+    start: Option<f64>,
     /// Largest error and largest energy so far, mJ.
     error: f64,
     largest: f64,
 }
 
-impl Ledger {
-    fn new(e: &Energies) -> Self {
-        Self { start: e.output() - e.input(), error: 0.0, largest: f64::MIN_POSITIVE }
+impl Default for Ledger {
+    fn default() -> Self {
+        Self { start: None, error: 0.0, largest: f64::MIN_POSITIVE }
     }
+}
 
+impl Ledger {
     fn look(&mut self, e: &Energies) {
-        let error = (e.output() - e.input() - self.start).abs();
+        let kept = e.output() - e.input();
+        let error = (kept - *self.start.get_or_insert(kept)).abs();
         // a maximum would forget what is not a number
         if error.is_nan() || error > self.error {
             self.error = error;
         }
         self.largest = self.largest.max(e.output());
+    }
+}
+
+impl Default for Observed {
+    fn default() -> Self {
+        Self {
+            verdict: Verdict::Finished,
+            message: String::new(),
+            steps: 0,
+            retries: 0,
+            dt: f64::INFINITY,
+            dt_limit: f64::INFINITY,
+            balance: 0.0,
+            penetration: 0.0,
+            min_jacobian: f64::INFINITY,
+            energies: Energies::default(),
+            displacements: Vec::new(),
+            drift: 0.0,
+            thickness_ratio: f64::NAN,
+            tension: f64::NAN,
+            tension_ratio: f64::NAN,
+        }
     }
 }
 

@@ -11,13 +11,14 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Columns of `stability.csv`. Steps and limits are the smallest of a run, errors and penetrations the largest; the limit is the
-/// estimate without factors.
+/// estimate in use, without factors.
 const STABILITY: &[&str] = &[
     "scene",
     "backend",
     "steps",
+    "retries",
     "dt_s",
-    "dt_limit_s",
+    "estimated_limit_s",
     "energy_balance_error",
     "penetration_mm",
     "min_jacobian",
@@ -86,6 +87,7 @@ pub fn stability(folder: &Path, machine: Machine, table: &Path) -> Result<Study>
                 name.as_ref().into(),
                 machine.into(),
                 (seen.steps as f64).into(),
+                (seen.retries as f64).into(),
                 seen.dt.into(),
                 seen.dt_limit.into(),
                 seen.balance.into(),

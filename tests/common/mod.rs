@@ -1,6 +1,8 @@
 //! Shared by the verification tests: cases from JSON snippets, and checks that print what they reached.
 #![allow(dead_code)]
 
+pub mod program;
+
 use serde_json::{Value, json};
 use tricot::case::read::{Loaded, read};
 use tricot::case::steps::Precision;
@@ -65,6 +67,17 @@ pub fn coarse_cell() -> Value {
         "integration": { "energy_tolerance": 100 },
         "effects": {}
     })
+}
+
+/// The coarse cell with a hold, frames and frequent checkpoints: a run of a second.
+pub fn short_cell() -> Value {
+    let steps = json!([
+        { "pretension": { "time_s": 1.5e-4 } },
+        { "hold": { "time_s": 2e-5 } },
+        { "shear": { "angle_deg": 3, "time_s": 1e-4 } }
+    ]);
+    let output = json!({ "rows_per_step": 6, "frames_at_deg": [1, 2], "pictures": false, "checkpoint_wall_s": 0.02 });
+    with(coarse_cell(), &[("/steps", steps), ("/output", output)])
 }
 
 /// A small specimen with threads held at its cuts, tightened fast.

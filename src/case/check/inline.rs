@@ -1,6 +1,6 @@
 //! A mesh written out in the case: sizes, shapes, names, and what the conditions catch.
 
-use super::{MAX_BEAMS, MAX_HEXES};
+use super::{MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM};
 use crate::case::Case;
 use crate::case::domain::{Condition, InlineBlock, InlineMesh, InlineThread};
 use crate::case::origin::Origin;
@@ -35,6 +35,7 @@ pub fn check(case: &Case, mesh: &InlineMesh, origin: &Origin) -> Result<()> {
     for (i, body) in mesh.threads.iter().enumerate() {
         thread(body, &format!("domain.mesh.threads.{i}"), origin)?;
     }
+    extent(mesh, origin)?;
     for (i, condition) in mesh.conditions.iter().enumerate() {
         catches(mesh, condition, &format!("domain.mesh.conditions.{i}"), origin)?;
     }
@@ -117,6 +118,33 @@ fn thread(thread: &InlineThread, path: &str, origin: &Origin) -> Result<()> {
         if i > 0 && difference(*node, thread.nodes[i - 1]).iter().all(|d| d.abs() < TOLERANCE_MM) {
             let message = format!("{node:?} repeats the node before it, a beam needs a length: remove one");
             return Err(origin.error(&format!("{path}.nodes.{i}"), message));
+        }
+    }
+    Ok(())
+}
+
+/// A scene may be anywhere, but not longer than positions reach.
+fn extent(mesh: &InlineMesh, origin: &Origin) -> Result<()> {
+    let in_blocks = mesh.blocks.iter().flat_map(|b| {
+        let nodes = b.corners.iter().flatten().chain(b.nodes.iter().flatten());
+        nodes.map(move |x| (x, &b.name))
+    });
+    let in_threads = mesh.threads.iter().flat_map(|t| t.nodes.iter().map(move |x| (x, &t.name)));
+    let all: Vec<(&[f64; 3], &String)> = in_blocks.chain(in_threads).collect();
+    for (c, axis) in ["x", "y", "z"].into_iter().enumerate() {
+        let order = |a: &&(&[f64; 3], &String), b: &&(&[f64; 3], &String)| a.0[c].total_cmp(&b.0[c]);
+        let (Some((low, lower)), Some((high, upper))) = (all.iter().min_by(order), all.iter().max_by(order)) else {
+            continue;
+        };
+        let far = low[c].min(-high[c]) < -MAX_POSITION_MM;
+        if far && high[c] - low[c] > 2.0 * MAX_POSITION_MM - 1.0 {
+            let message = format!(
+                "reaches along {axis} from {} mm ({lower:?}) to {} mm ({upper:?}), further than {} mm: move bodies together",
+                low[c],
+                high[c],
+                2.0 * MAX_POSITION_MM - 1.0
+            );
+            return Err(origin.error("domain.mesh", message));
         }
     }
     Ok(())
