@@ -37,6 +37,10 @@ pub use totals::{Largest, Sums, Totals};
 /// A plan, and what the host must know to drive it and to understand what it computes.
 pub struct Model {
     pub plan: Plan,
+    /// Stages of a step up to accelerations; the others move nodes.
+    pub forces: usize,
+    /// Those of the collect stages that see what motion has changed.
+    pub collect_motion: Vec<Stage>,
     pub buffers: Buffers,
     pub totals: Totals,
     /// True mass of every node, tonne, and mass with the floor.
@@ -349,6 +353,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         }
     };
     b.plan.step.push(assembly);
+    let forces = b.plan.step.len();
 
     // conditions
     let gravity = effects.gravity_mm_s2.unwrap_or_default().map(|g| g as f32);
@@ -463,6 +468,11 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         added_mass,
     };
     let (totals, slip) = totals::add(&mut b, &sources);
+    let moved = |stage: &&Stage| {
+        let taken = |buffer| buffer == work || Some(buffer) == reaction_work;
+        stage.reads.contains(&velocity) || stage.writes.iter().any(|(buffer, _)| taken(*buffer))
+    };
+    let collect_motion = b.plan.collect.iter().filter(moved).cloned().collect();
     let mut hex_at = vec![0; hexes * hex8::LANES];
     for (hex, (block, lane)) in solids.place.iter().enumerate() {
         hex_at[block * hex8::LANES + lane] = hex;
@@ -496,6 +506,8 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         },
         totals,
         plan: b.plan,
+        forces,
+        collect_motion,
         true_mass,
         mass: floored,
         first_thread: first,

@@ -103,15 +103,23 @@ impl Simulation {
         Ok(self.model.totals.contact.iter().map(|sums| sums.of(&totals, penalty::SUM_ENERGY)).sum())
     }
 
-    /// Adds the work that kernels summed since the last look.
-    pub(super) fn add_work(&mut self, totals: &[f64]) {
-        let places = &self.model.totals;
-        let only = |sums: Option<Sums>| sums.map_or(0.0, |sums| sums.of(totals, 0));
-        self.energies.damping += places.work.of(totals, WORK_DAMPING);
-        self.energies.inertia += places.work.of(totals, WORK_INERTIA);
-        self.energies.gravity += places.work.of(totals, WORK_GRAVITY);
-        self.energies.thermal += only(places.thermal);
-        self.energies.prescribed += only(places.reaction);
+    /// Adds the work that kernels summed since the last look: that of forces, and that of motion up to the middle of the last step.
+    pub(super) fn add_work(&mut self, totals: &[f64], after: &[f64]) {
+        let places = self.model.totals.clone();
+        let only = |sums: Option<Sums>, totals: &[f64]| sums.map_or(0.0, |sums| sums.of(totals, 0));
+        let motion = |totals: &[f64]| {
+            let [damping, inertia, gravity] =
+                [WORK_DAMPING, WORK_INERTIA, WORK_GRAVITY].map(|kind| places.work.of(totals, kind));
+            [damping, inertia, gravity, only(places.reaction, totals)]
+        };
+        let (before, last) = (motion(totals), motion(after));
+        let e = &mut self.energies;
+        let kinds = [&mut e.damping, &mut e.inertia, &mut e.gravity, &mut e.prescribed];
+        for (k, energy) in kinds.into_iter().enumerate() {
+            *energy += self.owed[k] + before[k] + 0.5 * last[k];
+            self.owed[k] = 0.5 * last[k];
+        }
+        e.thermal += only(places.thermal, totals);
     }
 
     /// Adds what contact summed since the last look.
@@ -152,12 +160,13 @@ impl Simulation {
         (steps > 0).then(|| sum.map(|row| row.map(|x| x / steps as f64)))
     }
 
-    /// Replaces the energies that belong to the present state.
-    pub(super) fn set_state(&mut self, totals: &[f64]) {
+    /// Replaces the energies that belong to the present state, with the mean of the kinetic energy then and after the last step.
+    pub(super) fn set_state(&mut self, totals: &[f64], after: &[f64]) {
         let places = &self.model.totals;
         let only = |sums: Option<Sums>| sums.map_or(0.0, |sums| sums.of(totals, 0));
         let modes = [0, 1, 2, 3].map(|mode| places.modes.map_or(0.0, |sums| sums.of(totals, mode)));
-        let kinetic = places.kinetic.of(totals, 0);
+        let mean = |sums: Sums| 0.5 * (sums.of(totals, 0) + sums.of(after, 0));
+        let kinetic = mean(places.kinetic);
         self.energies = Energies {
             elongation: modes[0],
             compaction: modes[1],
@@ -166,7 +175,7 @@ impl Simulation {
             axial: only(places.axial),
             bending: only(places.bending),
             kinetic,
-            kinetic_total: places.kinetic_total.map_or(kinetic, |sums| sums.of(totals, 0)),
+            kinetic_total: places.kinetic_total.map_or(kinetic, mean),
             ..self.energies
         };
     }
