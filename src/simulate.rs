@@ -1,8 +1,9 @@
 //! A scene in time: drives a backend through the schedule, keeps the energy ledger, and stops what goes wrong. It writes no files.
 //!
 //! Steps run in bursts, which grow as long as speeds do not and the contact skin is sure to last. After each burst the distance
-//! travelled decides on a contact search. After each window of bursts the sums that kernels keep per item are added up on the
-//! backend, only totals come to the host, and guards look at energies and limits.
+//! travelled decides on a contact search. At the end of each window of bursts the sums that kernels keep per item are added up on
+//! the backend, only totals come to the host, and guards look at energies and limits. They are those of one moment, where the last
+//! step starts: it is looked at between its forces and its motion, and velocities are the mean of those before and after.
 
 mod guards;
 mod ledger;
@@ -102,6 +103,10 @@ pub struct Simulation {
     largest_flow: f64,
     health: Health,
     stress: StressMean,
+    /// Totals in the middle of the last step of a window, and after it.
+    looked: [Vec<f64>; 2],
+    /// Half of the work of its motion, which the next look adds, mJ: see [`ledger`].
+    owed: [f64; 4],
     /// Time from which prescribed motion acts, s, and whether it does now.
     hold_from: f64,
     holds: bool,
@@ -201,6 +206,8 @@ impl Simulation {
             largest_flow: 0.0,
             health: Health::default(),
             stress: StressMean::default(),
+            looked: Default::default(),
+            owed: [0.0; 4],
             ready: false,
             mesh,
             model,
@@ -267,7 +274,12 @@ impl Simulation {
             let (from, steps) = (self.time - self.dt_before, self.step);
             while self.step < steps + WINDOW && self.time < until * (1.0 - 1e-12) {
                 let remaining = ((until - self.time) / self.dt).ceil().max(1.0) as u64;
-                self.burst(remaining.min(self.burst).min(steps + WINDOW - self.step))?;
+                let left = remaining.min(steps + WINDOW - self.step);
+                let burst = left.min(self.burst);
+                self.burst(burst, burst == left)?;
+                if burst == left {
+                    break;
+                }
             }
             self.look(self.step - steps, from, self.time - self.dt)?;
             if stop(self) {
@@ -284,18 +296,18 @@ impl Simulation {
         self.dt_before = self.dt;
         self.search()?;
         self.bend_at_rest();
-        let totals = self.diagnose()?;
+        let totals = self.diagnose(self.schedule.row(self.time, self.dt, self.dt_before))?;
         self.guard_step()?;
         self.choose_dt();
         self.dt_before = self.dt;
-        self.set_state(&totals);
+        self.set_state(&totals, &totals);
         self.energies.contact = self.contact_at_rest()?;
         self.start_energy = self.energies.output();
         Ok(())
     }
 
-    /// Some steps, then a search if the skin is used up.
-    fn burst(&mut self, steps: u64) -> Result<()> {
+    /// Some steps, of which the last one may be looked at, then a search if the skin is used up.
+    fn burst(&mut self, steps: u64, looks: bool) -> Result<()> {
         self.hold();
         let mut rows = Vec::with_capacity(steps as usize);
         let mut time = self.time;
@@ -307,9 +319,13 @@ impl Simulation {
             self.dt_before = self.dt;
             time += self.dt;
         }
-        self.backend.run(&self.model.plan.step, &rows);
+        let last = rows.len() - usize::from(looks);
+        self.backend.run(&self.model.plan.step, &rows[..last]);
         self.time = time;
         self.step += steps;
+        if looks {
+            self.looked_at_step(rows[last])?;
+        }
         self.backend.run(&self.model.plan.watch, &rows[..1]);
         let status = self.backend.uints(self.model.buffers.status);
         self.alive()?;
@@ -330,6 +346,16 @@ impl Simulation {
         let longer = if self.speed > CALM * before { BURST } else { 2 * self.burst };
         self.burst = longer.min(sure).clamp(BURST, WINDOW);
         Ok(())
+    }
+
+    /// A step with its totals in the middle and after it.
+    fn looked_at_step(&mut self, row: Row<f64>) -> Result<()> {
+        self.backend.run(&self.model.plan.step[..self.model.forces], &[row]);
+        let middle = self.diagnose(row)?;
+        self.backend.run(&self.model.plan.step[self.model.forces..], &[row]);
+        self.backend.run(&self.model.collect_motion, &[row]);
+        self.looked = [middle, self.backend.scalars(self.model.totals.buffer)];
+        self.alive()
     }
 
     /// Lets prescribed motion act from its time on, by the masks of its nodes.
@@ -426,11 +452,11 @@ impl Simulation {
 
     /// Energies, limits and guards after a window of `steps` from time `from` to `to`.
     fn look(&mut self, steps: u64, from: f64, to: f64) -> Result<()> {
-        let totals = self.diagnose()?;
-        self.add_work(&totals);
+        let [totals, after] = std::mem::take(&mut self.looked);
+        self.add_work(&totals, &after);
         self.add_contact(&totals);
         self.add_stress(&totals, steps, from, to);
-        self.set_state(&totals);
+        self.set_state(&totals, &after);
         let e = &self.energies;
         let flow = [e.thermal, e.radius, e.external, e.prescribed, e.gravity].iter().map(|w| w.abs()).sum::<f64>();
         self.largest_flow = self.largest_flow.max(flow + self.start_energy.abs()).max(e.output());
@@ -442,8 +468,7 @@ impl Simulation {
     }
 
     /// Runs the stages for energies and limits; returns the totals.
-    fn diagnose(&mut self) -> Result<Vec<f64>> {
-        let row = self.schedule.row(self.time, self.dt, self.dt_before);
+    fn diagnose(&mut self, row: Row<f64>) -> Result<Vec<f64>> {
         self.backend.run(&self.model.plan.diagnose, &[row]);
         self.backend.run(&self.model.plan.collect, &[row]);
         let places = &self.model.totals;

@@ -45,6 +45,10 @@ pub use totals::{Largest, Sums, Totals};
 pub struct Model {
     pub plan: Plan,
     pub active: Active,
+    /// Stages of a step up to accelerations; the others move nodes.
+    pub forces: usize,
+    /// Those of the collect stages that see what motion has changed.
+    pub collect_motion: Vec<Stage>,
     pub buffers: Buffers,
     pub totals: Totals,
     /// True mass of every node, tonne, and mass with the floor.
@@ -351,6 +355,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     }
     let kernel = flagged!(Assemble; contact.is_some(), active.contact_mass, active.bending);
     b.plan.step.push(waiting(coded(kernel, "assemble", nodes, NODE_GRAIN, &reads, &writes, assemble_params)));
+    let forces = b.plan.step.len();
 
     // conditions
     let gravity = effects.gravity_mm_s2.unwrap_or_default().map(|g| g as f32);
@@ -458,6 +463,11 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         added_mass,
     };
     let (totals, slip) = totals::add(&mut b, &sources);
+    let moved = |stage: &&Stage| {
+        let taken = |buffer| Some(buffer) == work || Some(buffer) == reaction_work;
+        stage.reads.contains(&velocity) || stage.writes.iter().any(|(buffer, _)| taken(*buffer))
+    };
+    let collect_motion = b.plan.collect.iter().filter(moved).cloned().collect();
     let mut hex_at = vec![0; hexes * LANES];
     for (hex, (block, lane)) in solids.place.iter().enumerate() {
         hex_at[block * LANES + lane] = hex;
@@ -493,6 +503,8 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         totals,
         active,
         plan: b.plan,
+        forces,
+        collect_motion,
         true_mass,
         mass: floored,
         first_thread: first,

@@ -117,19 +117,26 @@ impl Simulation {
         self.backend.run(&stages, &[row]);
     }
 
-    /// Adds the work that kernels summed since the last look.
-    pub(super) fn add_work(&mut self, totals: &[f64]) {
-        let places = &self.model.totals;
-        let only = |sums: Option<Sums>| sums.map_or(0.0, |sums| sums.of(totals, 0));
-        if let Some(work) = places.work {
-            let done = |plane: Option<usize>| plane.map_or(0.0, |plane| work.of(totals, plane));
+    /// Adds the work that kernels summed since the last look: that of forces, and that of motion up to the middle of the last step.
+    pub(super) fn add_work(&mut self, totals: &[f64], after: &[f64]) {
+        let places = self.model.totals.clone();
+        let only = |sums: Option<Sums>, totals: &[f64]| sums.map_or(0.0, |sums| sums.of(totals, 0));
+        let motion = |totals: &[f64]| {
+            let done = |plane: Option<usize>| match (places.work, plane) {
+                (Some(work), Some(plane)) => work.of(totals, plane),
+                _ => 0.0,
+            };
             let [damping, inertia, gravity] = places.works.planes().map(done);
-            self.energies.damping += damping;
-            self.energies.inertia += inertia;
-            self.energies.gravity += gravity;
+            [damping, inertia, gravity, only(places.reaction, totals)]
+        };
+        let (before, last) = (motion(totals), motion(after));
+        let e = &mut self.energies;
+        let kinds = [&mut e.damping, &mut e.inertia, &mut e.gravity, &mut e.prescribed];
+        for (k, energy) in kinds.into_iter().enumerate() {
+            *energy += self.owed[k] + before[k] + 0.5 * last[k];
+            self.owed[k] = 0.5 * last[k];
         }
-        self.energies.thermal += only(places.thermal);
-        self.energies.prescribed += only(places.reaction);
+        e.thermal += only(places.thermal, totals);
     }
 
     /// Adds what contact summed since the last look.
@@ -172,12 +179,13 @@ impl Simulation {
         (steps > 0).then(|| sum.map(|row| row.map(|x| x / steps as f64)))
     }
 
-    /// Replaces the energies that belong to the present state.
-    pub(super) fn set_state(&mut self, totals: &[f64]) {
+    /// Replaces the energies that belong to the present state, with the mean of the kinetic energy then and after the last step.
+    pub(super) fn set_state(&mut self, totals: &[f64], after: &[f64]) {
         let places = &self.model.totals;
         let only = |sums: Option<Sums>| sums.map_or(0.0, |sums| sums.of(totals, 0));
         let modes = [0, 1, 2, 3].map(|mode| places.modes.map_or(0.0, |sums| sums.of(totals, mode)));
-        let kinetic = places.kinetic.of(totals, 0);
+        let mean = |sums: Sums| 0.5 * (sums.of(totals, 0) + sums.of(after, 0));
+        let kinetic = mean(places.kinetic);
         self.energies = Energies {
             elongation: modes[0],
             compaction: modes[1],
@@ -187,7 +195,7 @@ impl Simulation {
             axial: only(places.axial),
             bending: only(places.bending),
             kinetic,
-            kinetic_total: places.kinetic_total.map_or(kinetic, |sums| sums.of(totals, 0)),
+            kinetic_total: places.kinetic_total.map_or(kinetic, mean),
             ..self.energies
         };
     }

@@ -21,8 +21,10 @@ const PATIENCE: usize = 20;
 const MOST_ROUNDS: usize = 1500;
 /// Relative growth of ω² that is none.
 const SETTLED: f64 = 1e-3;
-/// Relative difference between a step and its limit at which the two are the same.
-const SAME: f64 = 3e-3;
+/// Relative difference between a step that lasts and one that does not at which the limit is found.
+const SAME: f64 = 0.01;
+/// Least factor between two steps that are tried before both kinds are known.
+const STRIDE: f64 = 1.05;
 /// Where a step that is never long enough for its own mass is given up, as a multiple of the first.
 const FAR: f64 = 100.0;
 
@@ -101,14 +103,17 @@ impl Simulation {
             free,
             seed: 1,
         };
-        let mut dt = first;
-        loop {
-            let limit = oscillation.limit(dt);
-            let same = (limit / dt - 1.0).abs() < SAME;
-            dt = limit;
-            if same || dt > FAR * first {
-                break;
-            }
+        let (mut dt, mut lasts, mut fails) = (first, 0.0, f64::INFINITY);
+        while fails > (1.0 + SAME) * lasts && dt < FAR * first {
+            let room = oscillation.limit(dt) / dt;
+            *if room >= 1.0 { &mut lasts } else { &mut fails } = dt;
+            dt = if lasts > 0.0 && fails.is_finite() {
+                (lasts * fails).sqrt()
+            } else if lasts > 0.0 {
+                dt * room.max(STRIDE)
+            } else {
+                dt * room.min(1.0 / STRIDE)
+            };
         }
         let motion = std::mem::take(&mut oscillation.motion);
         self.backend.restore();

@@ -101,6 +101,7 @@ impl Simulation {
         self.health.record(record);
         self.stress.record(record);
         self.ready.record(record);
+        self.owed.iter_mut().for_each(|x| x.record(record));
     }
 
     /// State on the host and in every buffer that is no table. Take it where [`advance`](Self::advance) has returned.
