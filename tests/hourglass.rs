@@ -221,8 +221,7 @@ fn a_cantilever_converges_to_beam_theory_with_either_element() {
             ratio
         });
         let errors = found.map(|ratio| (ratio - 1.0).abs());
-        assert!(errors[1] < 0.5 * errors[0] && errors[2] < 0.4 * errors[1], "{name}: {errors:?}");
-        assert!(errors[2] < 0.05, "{name}: {errors:?}");
+        assert!(errors[0] > errors[1] && errors[1] > errors[2] && errors[2] < 0.05, "{name}: {errors:?}");
     }
 }
 
@@ -296,52 +295,48 @@ fn the_estimated_step_is_stable_whatever_the_coefficient() {
     assert!(steps[2] < 0.5 * steps[1], "stiff control does not shorten the step");
 }
 
+/// A yarn on fibre lines whose edges along the fibre are turned up and down in turn, let go with a small kick.
+fn tilted(tilt: f64, integration: Value) -> Simulation {
+    let yarn = block("yarn", [16, 4, 2], [[0.0; 3], [4.8, 1.2, 0.4]], DENSITY, charmetant());
+    let changes = [("/effects/fibre_lines", json!({})), ("/integration", integration)];
+    let mut simulation = start(&reduced(with(scene(json!([yarn])), &changes)), F64);
+    // no element is stretched in the mean
+    let amplitude = 0.5 * 0.3 * tilt;
+    let odd = |x: &[f64; 3]| ((x[0] / 0.3).round() + (x[1] / 0.3).round() + (x[2] / 0.2).round()) as i64 % 2 == 1;
+    let moved: Displacements =
+        simulation.mesh.nodes.iter().map(|x| [0.0, 0.0, if odd(x) { amplitude } else { -amplitude }]).collect();
+    simulation.set_fluctuations(&moved);
+    let mut random = Random(6);
+    let kick: Displacements = moved.iter().map(|_| [0; 3].map(|_| 10.0 * random.draw())).collect();
+    simulation.set_velocities(&kick);
+    simulation
+}
+
+/// Fibre lines add inertia along their segments, an element is stiff along its mean fibre.
 #[test]
 fn the_estimated_step_is_stable_where_edges_turn_away_from_the_fibre() {
-    let yarn = block("yarn", [16, 4, 2], [[0.0; 3], [4.8, 1.2, 0.4]], DENSITY, charmetant());
-    let case = with(
-        scene(json!([yarn])),
-        &[("/effects/fibre_lines", json!({})), ("/effects/bending", json!(false)), ("/integration", free_step())],
-    );
-    let mut steps = Vec::new();
-    for tilt in [0.0, 0.1] {
-        let mesh = start(&reduced(case.clone()), F64).mesh;
-        // every second node up, the others down: no element is stretched in the mean
-        let amplitude = 0.5 * 0.3 * tilt;
-        let odd = |x: &[f64; 3]| (x[0] / 0.3).round() + (x[1] / 0.3).round() + (x[2] / 0.2).round();
-        let moved: Displacements = mesh
-            .nodes
-            .iter()
-            .map(|x| [0.0, 0.0, if odd(x) as i64 % 2 == 0 { amplitude } else { -amplitude }])
-            .collect();
-        let case = reduced(case.clone());
-        let mut random = Random(6);
-        let kick: Displacements = moved.iter().map(|_| [0; 3].map(|_| 10.0 * random.draw())).collect();
-        let kicked = |case: &Value| {
-            let mut simulation = start(case, F64);
-            simulation.set_fluctuations(&moved);
-            simulation.set_velocities(&kick);
-            simulation
-        };
-        // a step that changes changes the mass of fibre lines, and with it the energy: a fixed one, with the default
-        // safety, shows what is stable
+    // a step that changes changes the mass of fibre lines, and with it the energy: a fixed one, with the default safety of the
+    // smallest estimate, shows what is stable
+    let limits = [0.0, 0.1].map(|tilt| {
         let mut limit = f64::INFINITY;
         let smallest = |s: &Simulation| {
             limit = limit.min(s.health().dt_limit);
             false
         };
-        kicked(&case).advance(1e-3, smallest).unwrap();
-        let mut simulation = kicked(&with(case, &[("/integration/dt_s", json!(0.9 * limit))]));
-        let growth = growth(&mut simulation, 1e-3);
-        println!(
-            "tilt {tilt}: {} steps of about {:.2e} s, energy grows by {growth:.3}",
-            simulation.step(),
-            simulation.dt()
-        );
+        tilted(tilt, free_step()).advance(1e-3, smallest).unwrap();
+        let mut fixed = tilted(tilt, json!({ "dt_s": 0.9 * limit, "energy_tolerance": 100 }));
+        let growth = growth(&mut fixed, 1e-3);
+        println!("tilt {tilt}: {} steps of {:.2e} s, energy grows by {growth:.3}", fixed.step(), fixed.dt());
         assert!(growth < 1.1, "{growth}");
-        steps.push(simulation.step());
-    }
-    assert!(steps[1] > steps[0], "the tilt does not shorten the step");
+        limit
+    });
+    assert!(limits[1] < limits[0], "the tilt does not shorten the step");
+    let long = 6.0 * limits[1];
+    assert!(long < limits[0]);
+    let mut forced = tilted(0.1, json!({ "dt_s": long, "energy_tolerance": 100 }));
+    let outcome = forced.advance(5e-4, |_| false);
+    println!("tilted, at a step that the straight yarn stands: {outcome:?}");
+    assert!(outcome.is_err(), "the longer step is stable as well");
 }
 
 #[test]

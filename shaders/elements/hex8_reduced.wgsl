@@ -2,7 +2,8 @@
 
 #include "elements/block"
 
-// Numbers of a shape, and where they start: B of each corner, the volume, Σ h X of each mode, k of each mode.
+// Numbers of a shape, and where they start: of the B of both ends of each edge along ξ half the difference and half the sum,
+// the volume, Σ h X of each mode, k of each mode.
 const SHAPE: u32 = 41u * LANES;
 const VOLUME: u32 = 24u;
 const MOMENTS: u32 = 25u;
@@ -32,15 +33,24 @@ fn volume(h: Hex) -> f32 {
     return entry(h, VOLUME);
 }
 
-// B of a binary corner.
-fn slope(h: Hex, corner: u32) -> vec3<f32> {
-    return vec3<f32>(entry(h, 3u * corner), entry(h, 3u * corner + 1u), entry(h, 3u * corner + 2u));
+fn shape_vector(h: Hex, first: u32) -> vec3<f32> {
+    return vec3<f32>(entry(h, first), entry(h, first + 1u), entry(h, first + 2u));
+}
+
+// Half the difference of B at both ends of an edge along ξ: strain of fibres comes from differences of near nodes, which f32
+// does not round.
+fn difference_of(h: Hex, edge: u32) -> vec3<f32> {
+    return shape_vector(h, 6u * edge);
+}
+
+// Half the sum of B at both ends of an edge along ξ.
+fn sum_of(h: Hex, edge: u32) -> vec3<f32> {
+    return shape_vector(h, 6u * edge + 3u);
 }
 
 // Σ h X of a mode.
 fn moment(h: Hex, mode: u32) -> vec3<f32> {
-    let first = MOMENTS + 3u * mode;
-    return vec3<f32>(entry(h, first), entry(h, first + 1u), entry(h, first + 2u));
+    return shape_vector(h, MOMENTS + 3u * mode);
 }
 
 // Adds u ⊗ B.
@@ -65,23 +75,24 @@ fn deformation(h: Hex, q: Tensor) -> Deformation {
     let u5 = displacement(h, 5u, at, rest);
     let u6 = displacement(h, 7u, at, rest);
     let u7 = displacement(h, 6u, at, rest);
-    // components along global axes, derivatives along those of the fibre
-    var mixed = Tensor();
-    mixed = add_product_of(u1, slope(h, 1u), mixed);
-    mixed = add_product_of(u2, slope(h, 2u), mixed);
-    mixed = add_product_of(u3, slope(h, 3u), mixed);
-    mixed = add_product_of(u4, slope(h, 4u), mixed);
-    mixed = add_product_of(u5, slope(h, 5u), mixed);
-    mixed = add_product_of(u6, slope(h, 6u), mixed);
-    mixed = add_product_of(u7, slope(h, 7u), mixed);
-    // Σ h u of the modes ηζ, ξζ, ξη and ξηζ
+    // differences and sums over edges along ξ
     let d1 = u3 - u2;
     let d2 = u5 - u4;
     let d3 = u7 - u6;
+    let s1 = u2 + u3;
+    let s2 = u4 + u5;
+    let s3 = u6 + u7;
+    // components along global axes, derivatives along those of the fibre
+    var mixed = Tensor();
+    mixed = add_product_of(u1, sum_of(h, 0u), add_product_of(u1, difference_of(h, 0u), mixed));
+    mixed = add_product_of(s1, sum_of(h, 1u), add_product_of(d1, difference_of(h, 1u), mixed));
+    mixed = add_product_of(s2, sum_of(h, 2u), add_product_of(d2, difference_of(h, 2u), mixed));
+    mixed = add_product_of(s3, sum_of(h, 3u), add_product_of(d3, difference_of(h, 3u), mixed));
+    // Σ h u of the modes ηζ, ξζ, ξη and ξηζ
     let low = d1 - u1;
     let high = d3 - d2;
     let modes = array<vec3<f32>, 4>(
-        unseen(h, 0u, (u1 - (u2 + u3)) + ((u6 + u7) - (u4 + u5)), mixed),
+        unseen(h, 0u, (u1 - s1) + (s3 - s2), mixed),
         unseen(h, 1u, (d2 + d3) - (u1 + d1), mixed),
         unseen(h, 2u, low + high, mixed),
         unseen(h, 3u, high - low, mixed),
@@ -90,9 +101,12 @@ fn deformation(h: Hex, q: Tensor) -> Deformation {
 }
 
 #if force
-// Writes the force on a corner (in mesh order) from its B and Σ h k q.
-fn store_force(h: Hex, at: u32, corner: u32, binary: u32, conjugate: Tensor, sum: vec3<f32>) {
-    store(at + 3u * corner * LANES, -(sum + slope(h, binary) * conjugate));
+// Writes the forces on both ends of an edge along ξ (in mesh order) from Σ h k q there.
+fn store_edge(h: Hex, at: u32, low: u32, high: u32, edge: u32, conjugate: Tensor, held_low: vec3<f32>, held_high: vec3<f32>) {
+    let d = difference_of(h, edge) * conjugate;
+    let s = sum_of(h, edge) * conjugate;
+    store(at + 3u * low * LANES, d - (s + held_low));
+    store(at + 3u * high * LANES, -d - (s + held_high));
 }
 
 fn force(number: u32) {
@@ -119,14 +133,10 @@ fn force(number: u32) {
     let along2 = g1 - plus;
     let along3 = g1 + plus;
     let at = SLOTS * block + lane;
-    store_force(h, at, 0u, 0u, conjugate, g0 - along0);
-    store_force(h, at, 1u, 1u, conjugate, g0 + along0);
-    store_force(h, at, 2u, 3u, conjugate, along1 - g0);
-    store_force(h, at, 3u, 2u, conjugate, -(g0 + along1));
-    store_force(h, at, 4u, 4u, conjugate, -(g0 + along2));
-    store_force(h, at, 5u, 5u, conjugate, along2 - g0);
-    store_force(h, at, 6u, 7u, conjugate, g0 + along3);
-    store_force(h, at, 7u, 6u, conjugate, g0 - along3);
+    store_edge(h, at, 0u, 1u, 0u, conjugate, g0 - along0, g0 + along0);
+    store_edge(h, at, 3u, 2u, 1u, conjugate, -(g0 + along1), along1 - g0);
+    store_edge(h, at, 4u, 5u, 2u, conjugate, -(g0 + along2), along2 - g0);
+    store_edge(h, at, 7u, 6u, 3u, conjugate, g0 - along3, g0 + along3);
 #if PERIODIC
     add_virial(block, lane, q, weighted);
 #endif
@@ -156,6 +166,12 @@ fn energy(number: u32) {
 #endif
 
 #if bound
+// B of a binary corner.
+fn slope(h: Hex, corner: u32) -> vec3<f32> {
+    let sign = select(-1.0, 1.0, corner % 2u == 1u);
+    return sum_of(h, corner / 2u) + sign * difference_of(h, corner / 2u);
+}
+
 // Sign of a mode at a binary corner.
 fn sign_of(mode: u32, corner: u32) -> f32 {
     let s = vec3<f32>((vec3<u32>(corner) >> vec3<u32>(0u, 1u, 2u)) & vec3<u32>(1u)) * 2.0 - 1.0;
@@ -200,7 +216,7 @@ fn bound(number: u32) {
         // covered, (d + e)² ≤ 2 d² + 2 e²
         total = 0.0;
         for (var a = 0u; a < 8u; a++) {
-            let b = abs(entry(h, 3u * a));
+            let b = abs(slope(h, a).x);
             let lower = sign_of(1u, a) * state.modes[1] + sign_of(2u, a) * state.modes[2];
             let apart = lower + sign_of(3u, a) * state.modes[3];
             sizes[a] = b * b * sqrt(dot(apart, apart));

@@ -22,7 +22,8 @@ use crate::materials::{Material, Tensor, jacobian};
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Numbers of a shape: B of each corner (3), the volume, Σ h_α X of each mode (3), k_α of each mode; times lanes.
+/// Numbers of a shape: of the B of both ends of each edge along ξ half the difference and half the sum (3 each), the volume,
+/// Σ h_α X of each mode (3), k_α of each mode; times lanes.
 pub const SHAPE: usize = (STIFFNESS + 4) * LANES;
 /// Where they start.
 const VOLUME: usize = 24;
@@ -49,10 +50,22 @@ pub struct Energy<M>(PhantomData<M>);
 /// Row sums of the stiffness that fibre lines do not cover.
 pub struct Bound<M>(PhantomData<M>);
 
+/// Half the difference and half the sum of B at both ends of an edge along ξ: strain of fibres comes from differences of near
+/// nodes, which f32 does not round.
+#[inline(always)]
+fn slopes<L: Lane>(lanes: &Lanes<L>, edge: usize) -> [[L; 3]; 2] {
+    let first = 6 * edge;
+    [
+        [lanes.shape(first), lanes.shape(first + 1), lanes.shape(first + 2)],
+        [lanes.shape(first + 3), lanes.shape(first + 4), lanes.shape(first + 5)],
+    ]
+}
+
 /// B of a binary corner.
 #[inline(always)]
 fn slope<L: Lane>(lanes: &Lanes<L>, corner: usize) -> [L; 3] {
-    [lanes.shape(3 * corner), lanes.shape(3 * corner + 1), lanes.shape(3 * corner + 2)]
+    let [d, s] = slopes(lanes, corner / 2);
+    if corner % 2 == 1 { [s[0] + d[0], s[1] + d[1], s[2] + d[2]] } else { [s[0] - d[0], s[1] - d[1], s[2] - d[2]] }
 }
 
 /// Σ h_α X of a mode.
@@ -62,16 +75,21 @@ fn moment<L: Lane>(lanes: &Lanes<L>, mode: usize) -> [L; 3] {
     [lanes.shape(first), lanes.shape(first + 1), lanes.shape(first + 2)]
 }
 
-/// Σ_a h_αa u_a of each mode.
+/// Differences and sums of corner values over the edges along ξ.
 #[inline(always)]
-fn sums<L: Lane>(u: &[L; 8]) -> [L; 4] {
-    let s = [u[0] + u[1], u[2] + u[3], u[4] + u[5], u[6] + u[7]];
+fn edges<L: Lane>(u: &[L; 8]) -> [[L; 4]; 2] {
     let d = [u[1] - u[0], u[3] - u[2], u[5] - u[4], u[7] - u[6]];
+    [d, [u[0] + u[1], u[2] + u[3], u[4] + u[5], u[6] + u[7]]]
+}
+
+/// Σ_a h_αa u_a of each mode, from [`edges`].
+#[inline(always)]
+fn sums<L: Lane>([d, s]: &[[L; 4]; 2]) -> [L; 4] {
     let (low, high) = (d[1] - d[0], d[3] - d[2]);
     [(s[0] - s[1]) + (s[3] - s[2]), (d[2] + d[3]) - (d[0] + d[1]), low + high, high - low]
 }
 
-/// The transpose of [`sums`]: Σ_α h_αa g_α of each corner.
+/// The transpose of [`sums`] of [`edges`]: Σ_α h_αa g_α of each corner.
 #[inline(always)]
 fn spread<L: Lane>(g: [L; 4]) -> [L; 8] {
     let (plus, minus) = (g[2] + g[3], g[3] - g[2]);
@@ -100,17 +118,19 @@ struct Deformation<L> {
 fn deformation<L: Lane>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize) -> Deformation<L> {
     let zero = L::new(0.0);
     let u = lanes.displacements(io, nodes);
-    // components along global axes, derivatives along those of the fibre; the first corner does not move against itself
+    let edges = [edges(&u[0]), edges(&u[1]), edges(&u[2])];
+    // components along global axes, derivatives along those of the fibre
     let mut mixed = [[zero; 3]; 3];
-    for corner in 1..8 {
-        let b = slope(lanes, corner);
+    for edge in 0..4 {
+        let [difference, sum] = slopes(lanes, edge);
         for i in 0..3 {
+            let [d, s] = &edges[i];
             for j in 0..3 {
-                mixed[i][j] = u[i][corner].fma(b[j], mixed[i][j]);
+                mixed[i][j] = s[edge].fma(sum[j], d[edge].fma(difference[j], mixed[i][j]));
             }
         }
     }
-    let seen = [sums(&u[0]), sums(&u[1]), sums(&u[2])];
+    let seen = [sums(&edges[0]), sums(&edges[1]), sums(&edges[2])];
     let mut modes = [[zero; 3]; 4];
     for (mode, q) in modes.iter_mut().enumerate() {
         let moment = moment(lanes, mode);
@@ -169,10 +189,15 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
                             conjugate[j] = conjugate[j] - held[mode] * moment[j];
                         }
                     }
-                    let held = spread(held);
+                    let mut f = spread(held);
+                    for edge in 0..4 {
+                        let [difference, sum] = slopes(&lanes, edge);
+                        let (d, s) = (dot(&conjugate, &difference), dot(&conjugate, &sum));
+                        f[2 * edge] = d - (s + f[2 * edge]);
+                        f[2 * edge + 1] = -d - (s + f[2 * edge + 1]);
+                    }
                     for (corner, &binary) in BINARY.iter().enumerate() {
-                        let f = -(held[binary] + dot(&conjugate, &slope(&lanes, binary)));
-                        lanes.store_force(out, corner, i, f);
+                        lanes.store_force(out, corner, i, f[binary]);
                     }
                 }
                 if PERIODIC {
@@ -256,7 +281,7 @@ impl<M: Material> Kernel for Bound<M> {
                     // not covered, (d + e)² ≤ 2 d² + 2 e²
                     let mut sizes = [zero; 8];
                     for (corner, size) in sizes.iter_mut().enumerate() {
-                        let along = lanes.shape(3 * corner).abs();
+                        let along = slope(&lanes, corner)[0].abs();
                         let mut square = zero;
                         for i in 0..3 {
                             let mut apart = zero;

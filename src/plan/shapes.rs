@@ -52,7 +52,8 @@ pub fn full(points: &[Point; 8]) -> Vec<f64> {
 }
 
 /// Numbers of [`hex8_reduced`](crate::elements::hex8_reduced): mean gradients B of the shape functions, for which two Gauss
-/// points a direction are exact; the volume; Σ h X of the modes; their stiffness.
+/// points a direction are exact, as half of their differences and sums over edges along ξ; the volume; Σ h X of the modes;
+/// their stiffness.
 ///
 /// The stiffness k = G ∫ |∇h|² dV / 8² in the parallelepiped with the mean gradients of (ξ, η, ζ) at right angles resists u = q h/8
 /// as if every component of the displacement gradient had the `modulus` G, MPa, and the integration were full.
@@ -81,5 +82,10 @@ pub fn reduced(points: &[Point; 8], corners: &[[f64; 3]; 8], modulus: f64) -> Ve
     // the mean of ξ² is a third, that of ξ² η² a ninth
     let shares = [(eta + zeta) / 3.0, (xi + zeta) / 3.0, (xi + eta) / 3.0, (xi + eta + zeta) / 9.0];
     let stiffness = shares.map(|share| modulus * volume * share / 64.0);
-    [means.concat(), vec![volume], moments.concat(), stiffness.to_vec()].concat()
+    let halves = means.chunks_exact(2).flat_map(|ends| {
+        let difference = [0, 1, 2].map(|j| 0.5 * (ends[1][j] - ends[0][j]));
+        [difference, [0, 1, 2].map(|j| 0.5 * (ends[1][j] + ends[0][j]))]
+    });
+    let halves: Vec<f64> = halves.flatten().collect();
+    [halves, vec![volume], moments.concat(), stiffness.to_vec()].concat()
 }
