@@ -147,7 +147,7 @@ fn a_study_says_what_its_runs_say_and_runs_none_of_them_twice() {
     // the flags of a point are those that make it, from the tightened state where only the loading differs
     let flags = table.texts("flags");
     assert_eq!(flags[5], "--set resolution.beams_per_lap=64");
-    assert!(flags[6].starts_with("--set steps.1.shear.time_s=2.5e-5 --from points/default/state/"), "{}", flags[6]);
+    assert!(flags[6].starts_with("--set steps.1.shear.time_s=0.000025 --from points/default/state/"), "{}", flags[6]);
     let hash = |dir: &Path| {
         let summary: Value = serde_json::from_slice(&fs::read(dir.join("summary.json")).unwrap()).unwrap();
         summary["state_hash"].as_str().unwrap().to_owned()
