@@ -123,7 +123,7 @@ fn a_study_says_what_its_runs_say_and_runs_none_of_them_twice() {
     assert!(labels.iter().all(|label| told.contains(label)), "{told}");
     let times = table.numbers("time_over_default");
     assert_eq!(table.texts("ended")[4], "impossible", "19 beams do not go around a lap");
-    assert!(times[0] == 1.0 && times.iter().all(|time| *time > 0.1 || time.is_nan()), "{times:?}");
+    assert!((times[..3].iter().sum::<f64>() - 3.0).abs() < 1e-9, "{times:?}");
     assert_eq!(times.iter().filter(|time| time.is_nan()).count(), 1, "{times:?}");
     // several times the work, whatever the machine does meanwhile
     assert!(times[3] > 2.0, "{times:?}");

@@ -287,6 +287,14 @@ impl Ran {
         self.ended == "finished"
     }
 
+    /// Mean time of some runs, the first of which lends the rest; `None` for none.
+    pub(super) fn mean(runs: &[&Self]) -> Option<Self> {
+        let mean = |of: &dyn Fn(&Self) -> Clocks| Clocks::mean(&runs.iter().map(|run| of(run)).collect::<Vec<_>>());
+        let work = mean(&|run| run.work);
+        let tightening = mean(&|run| run.tightening);
+        runs.first().map(|first| Self { work, tightening, ..(*first).clone() })
+    }
+
     /// Its time over that of another run, by the clock that tells; NaN if it did not finish.
     pub(super) fn over(&self, other: &Self) -> f64 {
         let clock = |clocks: Clocks| if self.by_processors { clocks.cpu } else { clocks.wall };
