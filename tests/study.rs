@@ -123,7 +123,7 @@ fn a_study_says_what_its_runs_say_and_runs_none_of_them_twice() {
     assert!(labels.iter().all(|label| told.contains(label)), "{told}");
     let times = table.numbers("time_over_default");
     assert_eq!(table.texts("ended")[4], "impossible", "19 beams do not go around a lap");
-    assert!(times[0] == 1.0 && times.iter().all(|time| *time > 0.1 || time.is_nan()), "{times:?}");
+    assert!((times[..3].iter().sum::<f64>() - 3.0).abs() < 1e-9, "{times:?}");
     assert_eq!(times.iter().filter(|time| time.is_nan()).count(), 1, "{times:?}");
     // several times the work, whatever the machine does meanwhile
     assert!(times[3] > 2.0, "{times:?}");
@@ -147,7 +147,7 @@ fn a_study_says_what_its_runs_say_and_runs_none_of_them_twice() {
     // the flags of a point are those that make it, from the tightened state where only the loading differs
     let flags = table.texts("flags");
     assert_eq!(flags[5], "--set resolution.beams_per_lap=64");
-    assert!(flags[6].starts_with("--set steps.1.shear.time_s=2.5e-5 --from points/default/state/"), "{}", flags[6]);
+    assert!(flags[6].starts_with("--set steps.1.shear.time_s=0.000025 --from points/default/state/"), "{}", flags[6]);
     let hash = |dir: &Path| {
         let summary: Value = serde_json::from_slice(&fs::read(dir.join("summary.json")).unwrap()).unwrap();
         summary["state_hash"].as_str().unwrap().to_owned()

@@ -11,7 +11,7 @@ pub struct Row {
     pub point: Point,
     pub ran: Ran,
     pub results: Option<Results>,
-    /// Time over that of the case itself; NaN if it did not finish.
+    /// Time over the mean of the case itself and its like; NaN if it did not finish.
     pub time: f64,
     /// Differences from the reference and from the case itself, by measure; `None` if it did not finish.
     pub errors: Vec<Option<Difference>>,
@@ -48,7 +48,7 @@ impl Findings {
             measures.iter().map(|m| results.map_or_else(Curve::new, |results| results.curve(m))).collect()
         };
         let (reference, itself) = (curves(of(Role::Reference)), curves(default));
-        let alike = rows.iter().filter(|row| matches!(row.point.role, Role::Default | Role::Chance));
+        let alike = rows.iter().filter(|row| row.is_alike());
         let alike: Vec<Vec<Curve>> = alike.filter_map(|row| row.results.as_ref()).map(|r| curves(Some(r))).collect();
         let scatter = |k: usize| {
             let alike: Vec<&[[f64; 2]]> = alike.iter().map(|curves| curves[k].as_slice()).collect();
@@ -63,7 +63,8 @@ impl Findings {
                 [from(&own, &reference), from(&own, &itself)]
             })
             .collect();
-        let unit = rows.first().map(|row| row.ran.clone());
+        let alike = rows.iter().filter(|row| row.is_alike() && row.ran.finished());
+        let unit = Ran::mean(&alike.map(|row| &row.ran).collect::<Vec<_>>());
         for (row, [errors, changes]) in rows.iter_mut().zip(compared) {
             (row.errors, row.changes) = (errors, changes);
             row.time = unit.as_ref().map_or(f64::NAN, |unit| row.ran.over(unit));
@@ -105,9 +106,9 @@ impl Findings {
         candidates.into_iter().map(|(number, ..)| number).collect()
     }
 
-    /// Times of runs that should take the same, over that of the case itself: smallest and largest.
+    /// Times of the case itself and its like, over their mean: smallest and largest.
     pub fn repeated(&self) -> [f64; 2] {
-        let alike = self.rows.iter().filter(|row| matches!(row.point.role, Role::Default | Role::Chance));
+        let alike = self.rows.iter().filter(|row| row.is_alike());
         alike.map(|row| row.time).fold([f64::NAN; 2], |[low, high], time| [low.min(time), high.max(time)])
     }
 
@@ -121,6 +122,11 @@ impl Row {
     /// Whether a user may choose it.
     pub fn is_offer(&self) -> bool {
         matches!(self.point.role, Role::Default | Role::Turned)
+    }
+
+    /// Whether it is the case itself, but for chance.
+    fn is_alike(&self) -> bool {
+        matches!(self.point.role, Role::Default | Role::Chance)
     }
 
     /// A number of its summary; NaN if there is none.

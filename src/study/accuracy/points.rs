@@ -50,7 +50,7 @@ pub struct Point {
 impl Point {
     /// Whether threads or device are its knob.
     fn has_own_machine(&self) -> bool {
-        self.flags.threads.is_some() || self.flags.machine.is_some()
+        self.flags.threads.is_some() || self.flags.cpu
     }
 
     /// Its folder among those of the points.
@@ -96,8 +96,7 @@ pub(super) struct Runner<'a> {
     default: Value,
     /// Load steps before the first shear or move.
     phases: usize,
-    /// Whether there is a GPU worth a point, and whether points run on one unless told otherwise.
-    has_gpu: bool,
+    /// Whether points run on a GPU unless told otherwise.
     on_gpu: bool,
     stopwatch: Stopwatch,
 }
@@ -110,9 +109,12 @@ impl<'a> Runner<'a> {
         let loads = |step: &Step| matches!(step, Step::Shear { .. } | Step::Move { .. });
         let phases = loaded.case.steps.iter().position(loads).unwrap_or(loaded.case.steps.len());
         let stopwatch = Stopwatch::new(case, sets, options.threads)?;
-        let has_gpu = gpu::devices().first().is_some_and(|d| d.is_discrete);
-        let on_gpu = options.machine == Machine::Gpu || options.machine == Machine::Auto && has_gpu;
-        Ok(Self { case, sets, options, default: value(&loaded)?, phases, has_gpu, on_gpu, stopwatch })
+        let on_gpu = match options.machine {
+            Machine::Cpu => false,
+            Machine::Gpu => true,
+            Machine::Auto => gpu::devices().first().is_some_and(|d| d.is_discrete),
+        };
+        Ok(Self { case, sets, options, default: value(&loaded)?, phases, on_gpu, stopwatch })
     }
 
     /// The points, in the order in which they are run: those that the others are compared with come first.
@@ -131,11 +133,7 @@ impl<'a> Runner<'a> {
         });
         let differs = |p: &Point| {
             let same_threads = p.flags.threads.is_some() && p.flags.threads == self.options.threads;
-            let same_machine = match p.flags.machine {
-                Some(Machine::Gpu) => self.on_gpu || !self.has_gpu,
-                Some(_) => !self.on_gpu,
-                None => false,
-            };
+            let same_machine = p.flags.cpu && !self.on_gpu;
             !same_threads && !same_machine
         };
         let mut points = vec![own];
@@ -181,7 +179,7 @@ impl<'a> Runner<'a> {
             return Ok(Some(ran));
         }
         let f64_on_gpu = loaded.case.integration.precision == Precision::F64 && self.options.machine == Machine::Gpu;
-        let machine = point.flags.machine.unwrap_or(if f64_on_gpu { Machine::Cpu } else { self.options.machine });
+        let machine = if point.flags.cpu || f64_on_gpu { Machine::Cpu } else { self.options.machine };
         let options = run::Options {
             output: folder.clone(),
             precision: None,
@@ -240,13 +238,13 @@ impl<'a> Runner<'a> {
 
     /// Options of `tricot run` that reproduce a point, besides the overrides of the study.
     fn flags(&self, point: &Point, from: Option<&Path>) -> String {
-        let Flags { sets, threads, machine } = &point.flags;
+        let Flags { sets, threads, cpu } = &point.flags;
         let sets = sets.iter().map(|set| format!("--set {set}"));
         let threads = threads.map(|count| format!("--threads {count}"));
-        let machine = machine.map(|m| format!("--backend {}", if m == Machine::Gpu { "gpu" } else { "cpu" }));
+        let cpu = cpu.then(|| "--backend cpu".to_owned());
         let from =
             from.and_then(Path::file_name).map(|name| format!("--from points/default/{FOLDER}/{}", name.display()));
-        sets.chain(threads).chain(machine).chain(from).collect::<Vec<_>>().join(" ")
+        sets.chain(threads).chain(cpu).chain(from).collect::<Vec<_>>().join(" ")
     }
 }
 
@@ -287,6 +285,14 @@ fn value(loaded: &Loaded) -> Result<Value> {
 impl Ran {
     pub fn finished(&self) -> bool {
         self.ended == "finished"
+    }
+
+    /// Mean time of some runs, the first of which lends the rest; `None` for none.
+    pub(super) fn mean(runs: &[&Self]) -> Option<Self> {
+        let mean = |of: &dyn Fn(&Self) -> Clocks| Clocks::mean(&runs.iter().map(|run| of(run)).collect::<Vec<_>>());
+        let work = mean(&|run| run.work);
+        let tightening = mean(&|run| run.tightening);
+        runs.first().map(|first| Self { work, tightening, ..(*first).clone() })
     }
 
     /// Its time over that of another run, by the clock that tells; NaN if it did not finish.

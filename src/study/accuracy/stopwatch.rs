@@ -37,6 +37,13 @@ impl Clocks {
         Self { wall: both(self.wall, other.wall), cpu: both(self.cpu, other.cpu) }
     }
 
+    /// Mean of some.
+    pub(super) fn mean(of: &[Self]) -> Self {
+        let sum = of.iter().fold(Self::default(), |sum, clocks| sum.with(*clocks, |a, b| a + b));
+        let count = of.len() as f64;
+        Self { wall: sum.wall / count, cpu: sum.cpu / count }
+    }
+
     fn since(self, before: Self) -> Self {
         self.with(before, |now, before| now - before)
     }

@@ -153,7 +153,7 @@ impl Report<'_> {
             ("default", wall(Role::Default)),
             ("reference", wall(Role::Reference)),
             ("finer reference differs by", check.map_or("not run".into(), |claim| format!("{} %", percent(claim)))),
-            ("repeated runs take", format!("{low:.3} to {high:.3} of the default")),
+            ("repeated runs take", format!("{low:.3} to {high:.3} of their mean")),
         ]);
         page.heading("Time against error");
         page.raw("<div class=\"studies\">");
@@ -236,7 +236,7 @@ impl Report<'_> {
         }
         let [low, high] = f.repeated();
         t += "errors in %: relative L2 difference from the reference, < where chance alone may make it; ◂ on the front\n";
-        let _ = write!(t, "time over that of the default; runs that only differ by chance take {low:.3} to {high:.3}");
+        let _ = write!(t, "time over the mean of runs that only differ by chance, which take {low:.3} to {high:.3}");
         t
     }
 }
