@@ -143,6 +143,9 @@ enum StudyCommand {
         /// What runs the scenes: cpu in f32 and f64, gpu, or auto for both as far as they are there
         #[arg(long, default_value = "auto")]
         backend: Machine,
+        /// Leave every scene after so many steps, for a device in software [default: none]
+        #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u64).range(1..))]
+        longest: Option<u64>,
         /// The table
         #[arg(short, long, value_name = "FILE", default_value = "results/stability.csv")]
         output: PathBuf,
@@ -259,8 +262,8 @@ fn perform(command: Command) -> Result<Done> {
             let out = output.unwrap_or_else(|| source.join("report.html"));
             run::report(&source, &out)?
         }
-        Command::Study { study: StudyCommand::Stability { folder, backend, output } } => {
-            let study = stability(&folder, backend.into(), &output)?;
+        Command::Study { study: StudyCommand::Stability { folder, backend, longest, output } } => {
+            let study = stability(&folder, backend.into(), longest, &output)?;
             return Ok(Done { text: study.text, code: if study.held { 0 } else { UNEXPECTED } });
         }
         Command::Picture { source, field, width, output } => {
