@@ -185,6 +185,9 @@ enum StudyCommand {
         /// What runs the scenes: cpu in f32 and f64, gpu, or auto for both as far as they are there
         #[arg(long, default_value = "auto")]
         backend: Machine,
+        /// Leave every scene after so many steps, for a device in software [default: none]
+        #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u64).range(1..))]
+        longest: Option<u64>,
         /// The table
         #[arg(short, long, value_name = "FILE", default_value = "results/stability.csv")]
         output: PathBuf,
@@ -347,8 +350,8 @@ fn perform(command: Command) -> Result<Done> {
             let study = accuracy(&case.case, &case.set, &options)?;
             return Ok(Done { text: study.text, code: if study.interrupted { INTERRUPTED } else { 0 } });
         }
-        Command::Study { study: StudyCommand::Stability { folder, backend, output } } => {
-            let study = stability(&folder, backend.into(), &output)?;
+        Command::Study { study: StudyCommand::Stability { folder, backend, longest, output } } => {
+            let study = stability(&folder, backend.into(), longest, &output)?;
             return Ok(Done { text: study.text, code: if study.held { 0 } else { UNEXPECTED } });
         }
         Command::Study { study: StudyCommand::Effects { case, only, precision, threads, backend, output, force } } => {

@@ -20,6 +20,8 @@ pub struct Observed {
     pub steps: u64,
     /// How often the scene went back to go on with shorter steps.
     pub retries: usize,
+    /// Whether it was left before its end, after as many steps as were wanted.
+    pub cut: bool,
     /// Smallest step, and smallest estimated limit without factors, s.
     pub dt: f64,
     pub dt_limit: f64,
@@ -44,12 +46,19 @@ pub struct Observed {
 /// Scenes on one machine; each is run once.
 pub struct Scenes {
     make: Make,
+    /// Steps after which a scene is left.
+    longest: u64,
     seen: BTreeMap<PathBuf, Observed>,
 }
 
 impl Scenes {
     pub fn new(make: Make) -> Self {
-        Self { make, seen: BTreeMap::new() }
+        Self { make, longest: u64::MAX, seen: BTreeMap::new() }
+    }
+
+    /// Leaves every scene after so many steps.
+    pub fn longest(self, steps: u64) -> Self {
+        Self { longest: steps, ..self }
     }
 
     /// Runs a case with overrides, and says which expectations do not hold.
@@ -62,7 +71,7 @@ impl Scenes {
         case.case.integration.precision = self.make.precision;
         let observed = match self.seen.get(path) {
             Some(observed) => observed.clone(),
-            None => observe(run::simulation(&case, self.make.clone())?)?,
+            None => observe(run::simulation(&case, self.make.clone())?, self.longest)?,
         };
         self.seen.insert(path.to_path_buf(), observed.clone());
         let Some(expect) = &loaded.case.expect else { return Ok((observed, Vec::new())) };
@@ -80,15 +89,15 @@ impl Scenes {
     }
 }
 
-/// Runs a simulation to its end or to a guard that stops it for good.
-fn observe(mut simulation: Simulation) -> Result<Observed> {
+/// Runs a simulation to its end, for so many steps, or to a guard that stops it for good.
+fn observe(mut simulation: Simulation, longest: u64) -> Result<Observed> {
     let mut retries = Retries::of(&simulation);
     let mut way = Way::default();
-    while way.phase < simulation.schedule.phases().len() {
+    while way.phase < simulation.schedule.phases().len() && simulation.step() < longest {
         if retries.due(&simulation) {
             retries.keep(&mut simulation, way.clone());
         }
-        match way.go(&mut simulation, &retries) {
+        match way.go(&mut simulation, &retries, longest) {
             Err(Error::Guard(guard)) => match retries.go_back(&mut simulation, guard) {
                 Ok(earlier) => way = earlier,
                 Err(error) => {
@@ -100,8 +109,9 @@ fn observe(mut simulation: Simulation) -> Result<Observed> {
             result => result?,
         }
     }
-    let Way { mut seen, ledger, before, .. } = way;
+    let Way { phase, mut seen, ledger, before } = way;
     seen.retries = retries.guards().len();
+    seen.cut = seen.verdict == Verdict::Finished && phase < simulation.schedule.phases().len();
     seen.balance = ledger.error / ledger.largest;
     seen.end(&simulation, &before);
     simulation.alive()?;
@@ -120,8 +130,8 @@ struct Way {
 }
 
 impl Way {
-    /// Goes on to the end of the load step, or until there is a state to keep.
-    fn go(&mut self, simulation: &mut Simulation, retries: &Retries<Self>) -> Result<()> {
+    /// Goes on to the end of the load step, to a number of steps, or until there is a state to keep.
+    fn go(&mut self, simulation: &mut Simulation, retries: &Retries<Self>, longest: u64) -> Result<()> {
         let Phase { start, end, .. } = simulation.schedule.phases()[self.phase];
         if self.before.is_empty() {
             self.before = simulation.fluctuations();
@@ -130,7 +140,7 @@ impl Way {
         self.ledger.look(simulation.energies());
         simulation.advance(end, |s| {
             self.look(s);
-            retries.due(s)
+            retries.due(s) || s.step() >= longest
         })?;
         if simulation.time() >= end * (1.0 - 1e-12) {
             self.phase += 1;
@@ -183,6 +193,7 @@ impl Default for Observed {
             message: String::new(),
             steps: 0,
             retries: 0,
+            cut: false,
             dt: f64::INFINITY,
             dt_limit: f64::INFINITY,
             balance: 0.0,

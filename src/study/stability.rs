@@ -66,11 +66,11 @@ pub fn scenes(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Runs every scene of a folder on every machine and writes the table, row by row.
+/// Runs every scene of a folder on every machine, each for so many steps at most, and writes the table, row by row.
 ///
 /// # Errors
 /// A case that cannot be run, a table that cannot be written, or no adapter where one is wanted.
-pub fn stability(folder: &Path, machine: Machine, table: &Path) -> Result<Study> {
+pub fn stability(folder: &Path, machine: Machine, longest: Option<u64>, table: &Path) -> Result<Study> {
     let machines = machines(machine)?;
     let paths = scenes(folder)?;
     if let Some(parent) = table.parent() {
@@ -79,9 +79,14 @@ pub fn stability(folder: &Path, machine: Machine, table: &Path) -> Result<Study>
     let mut rows = Table::create(table, STABILITY)?;
     let (mut text, mut failed) = (String::new(), 0);
     for (machine, make) in machines {
-        let mut scenes = Scenes::new(make);
+        let mut scenes = Scenes::new(make).longest(longest.unwrap_or(u64::MAX));
         for path in &paths {
-            let (seen, broken) = scenes.examine(path, &[])?;
+            let (seen, mut broken) = scenes.examine(path, &[])?;
+            if seen.cut {
+                // what it must show at its end, it cannot show yet
+                broken.clear();
+            }
+            let ended = if seen.cut { "cut short" } else { seen.verdict.name() };
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
             rows.row(&[
                 name.as_ref().into(),
@@ -93,8 +98,15 @@ pub fn stability(folder: &Path, machine: Machine, table: &Path) -> Result<Study>
                 seen.balance.into(),
                 seen.penetration.into(),
                 seen.min_jacobian.into(),
-                seen.verdict.name().into(),
-                if broken.is_empty() { "yes" } else { "no" }.into(),
+                ended.into(),
+                if seen.cut {
+                    "-"
+                } else if broken.is_empty() {
+                    "yes"
+                } else {
+                    "no"
+                }
+                .into(),
             ])?;
             // writing to a String does not fail
             let _ = writeln!(
@@ -107,7 +119,7 @@ pub fn stability(folder: &Path, machine: Machine, table: &Path) -> Result<Study>
                 100.0 * seen.balance,
                 seen.penetration,
                 seen.min_jacobian,
-                seen.verdict.name()
+                ended
             );
             for what in &broken {
                 let _ = writeln!(text, "    not as expected: {what}");
