@@ -9,47 +9,53 @@ const LAMBDA: u32 = 1u;
 // Smallest determinant of F that the logarithm is taken of.
 const CRUSHED: f32 = 1e-3;
 
-// |J − 1| below which J − 1 − ln J is taken from its series.
+// |x| below which φ(x) is taken from its series.
 const SMALL: f32 = 0.05;
 
-// How volume changes.
-struct Volume {
-    // Cofactors of H.
-    cofactors: Tensor,
-    // tr cof H + det H.
+// Strain of a volume: C − I, tr cof t + det t, det F, ln J, and φ(x).
+struct Strain {
+    t: Tensor,
     second: f32,
     j: f32,
-    // ln J, and J − 1 − ln J.
     log: f32,
     rest: f32,
 }
 
-fn volume_of(h: Tensor) -> Volume {
-    let c = Tensor(cross(h[1], h[2]), cross(h[2], h[0]), cross(h[0], h[1]));
-    let second = c[0][0] + c[1][1] + c[2][2] + dot(h[0], c[0]);
-    let x = h[0][0] + h[1][1] + h[2][2] + second;
+fn cofactors(a: Tensor) -> Tensor {
+    return Tensor(cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]));
+}
+
+fn strain(h: Tensor) -> Strain {
+    // row i of a product a * b in this layout is that of b a
+    let t = symmetric(h + transpose(h) + h * transpose(h));
+    let c = cofactors(t);
+    let second = c[0][0] + c[1][1] + c[2][2] + dot(t[0], c[0]);
+    let x = t[0][0] + t[1][1] + t[2][2] + second;
     let j = max(jacobian(h), CRUSHED);
-    let log = select(log1p(max(x, -0.5)), ln(j), x < -0.5);
+    let log = select(0.5 * log1p(max(x, -0.5)), ln(j), x < -0.5);
     var series = 0.0;
     for (var n = 13; n >= 2; n--) {
         series = fma(series, x, select(-1.0, 1.0, n % 2 == 0) / f32(n));
     }
-    return Volume(c, second, j, log, select(j - 1.0 - log, series * x * x, abs(x) < SMALL));
+    return Strain(t, second, j, log, select(x - (log + log), series * x * x, abs(x) < SMALL));
 }
 
 fn stress(p: array<f32, PARAMETERS>, h: Tensor) -> Tensor {
-    let v = volume_of(h);
-    let turned = transpose(h);
+    let s = strain(h);
     let one = Tensor(vec3<f32>(1.0, 0.0, 0.0), vec3<f32>(0.0, 1.0, 0.0), vec3<f32>(0.0, 0.0, 1.0));
-    let shear = v.j * h + turned - v.cofactors + v.second * one;
-    let normal = v.cofactors - turned + (1.0 + h[0][0] + h[1][1] + h[2][2]) * one;
-    return (p[MU] * shear + (p[LAMBDA] * v.log) * normal) * (1.0 / v.j);
+    let c = cofactors(one + s.t);
+    let square = s.j * s.j;
+    return add_product(h, symmetric((p[MU] / square) * (s.t * c) + (p[LAMBDA] * s.log / square) * c));
+}
+
+// The upper triangle on both sides.
+fn symmetric(a: Tensor) -> Tensor {
+    return Tensor(a[0], vec3<f32>(a[0].y, a[1].yz), vec3<f32>(a[0].z, a[1].z, a[2].z));
 }
 
 fn energies(p: array<f32, PARAMETERS>, h: Tensor) -> vec4<f32> {
-    let v = volume_of(h);
-    let square = dot(h[0], h[0]) + dot(h[1], h[1]) + dot(h[2], h[2]);
-    return vec4<f32>(p[MU] * (0.5 * square - v.second + v.rest) + 0.5 * p[LAMBDA] * v.log * v.log, 0.0, 0.0, 0.0);
+    let s = strain(h);
+    return vec4<f32>(0.5 * (p[MU] * (s.rest - s.second) + p[LAMBDA] * s.log * s.log), 0.0, 0.0, 0.0);
 }
 
 fn moduli(p: array<f32, PARAMETERS>, h: Tensor) -> Moduli {

@@ -1,9 +1,12 @@
 //! Compressible neo-Hookean solid, w = μ/2 (tr C − 3) − μ ln J + λ/2 (ln J)², for verification scenes.
 //!
-//! At small strain both parts of μ cancel to first order. With J − 1 = tr H + m, m = tr cof H + det H, they are written without
-//! what cancels: w = μ (½ H:H − m + φ(J − 1)) + …, φ(x) = x − ln(1 + x), and P = (μ (m I + J H + Hᵀ − cof H) + λ ln J cof F)/J.
+//! At small strain both parts of μ cancel to first order. They are written without what cancels, from t = C − I = H + Hᵀ + HᵀH,
+//! which a rotation leaves as it is: det C − 1 = x = tr t + m, m = tr cof t + det t, and
+//!
+//! - w = μ/2 (φ(x) − m) + λ/8 ln² (1 + x), φ(x) = x − ln(1 + x),
+//! - S = (μ cof C t + λ ln J cof C)/J², symmetric to the last bit.
 
-use super::{Material, Moduli, PARAMETERS, Tensor, jacobian};
+use super::{Material, Moduli, PARAMETERS, Tensor, add_product, jacobian};
 use crate::kernel::lane::Lane;
 use crate::kernel::math::{ln, log1p};
 
@@ -28,45 +31,46 @@ pub fn longitudinal(young: f64, poisson: f64) -> f64 {
 
 /// Smallest determinant of F that the logarithm is taken of.
 const CRUSHED: f64 = 1e-3;
-/// |J − 1| below which J − 1 − ln J is taken from its series, and the last power there.
+/// |x| below which φ(x) is taken from its series, and the last power there.
 const SMALL: f64 = 0.05;
 const TERMS: usize = 13;
 
-/// How volume changes.
-struct Volume<L> {
-    /// Cofactors of H.
-    cofactors: Tensor<L>,
-    /// tr cof H + det H.
+/// Strain of a volume.
+struct Strain<L> {
+    t: Tensor<L>,
+    /// m.
     second: L,
     j: L,
-    /// ln J, and J − 1 − ln J.
+    /// ln J, and φ(x).
     log: L,
     rest: L,
 }
 
 #[inline(always)]
-fn volume<L: Lane>(h: &Tensor<L>) -> Volume<L> {
-    let mut cofactors = *h;
-    for (i, row) in cofactors.iter_mut().enumerate() {
-        for (k, cofactor) in row.iter_mut().enumerate() {
-            let ([a, b], [c, d]) = (others(i), others(k));
-            *cofactor = h[a][c] * h[b][d] - h[a][d] * h[b][c];
+fn strain<L: Lane>(h: &Tensor<L>) -> Strain<L> {
+    let mut t = *h;
+    for i in 0..3 {
+        for k in i..3 {
+            let sum = h[i][k] + h[k][i];
+            t[i][k] = h[2][i].fma(h[2][k], h[1][i].fma(h[1][k], h[0][i].fma(h[0][k], sum)));
+            t[k][i] = t[i][k];
         }
     }
-    let c = &cofactors;
-    let determinant = h[0][2].fma(c[0][2], h[0][1].fma(c[0][1], h[0][0] * c[0][0]));
-    let second = c[0][0] + c[1][1] + c[2][2] + determinant;
-    let x = h[0][0] + h[1][1] + h[2][2] + second;
+    let row = [0, 1, 2].map(|k| cofactor(&t, 0, k));
+    let determinant = t[0][2].fma(row[2], t[0][1].fma(row[1], t[0][0] * row[0]));
+    let second = row[0] + cofactor(&t, 1, 1) + cofactor(&t, 2, 2) + determinant;
+    let x = t[0][0] + t[1][1] + t[2][2] + second;
     let j = jacobian(h).max(L::new(CRUSHED));
-    let log = L::select(x.lt(L::new(-0.5)), ln(j), log1p(x.max(L::new(-0.5))));
+    let (large, half) = (L::new(-0.5), L::new(0.5));
+    let log = L::select(x.lt(large), ln(j), half * log1p(x.max(large)));
     // Σ (−x)ⁿ/n from n = 2
     let mut series = L::new(0.0);
     for n in (2..=TERMS).rev() {
         let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
         series = series.fma(x, L::new(sign / n as f64));
     }
-    let rest = L::select(x.abs().lt(L::new(SMALL)), series * x * x, j - L::new(1.0) - log);
-    Volume { cofactors, second, j, log, rest }
+    let rest = L::select(x.abs().lt(L::new(SMALL)), series * x * x, x - (log + log));
+    Strain { t, second, j, log, rest }
 }
 
 impl Material for NeoHookean {
@@ -74,35 +78,30 @@ impl Material for NeoHookean {
 
     #[inline(always)]
     fn stress<L: Lane>(p: &[L; PARAMETERS], h: &Tensor<L>) -> Tensor<L> {
-        let one = L::new(1.0);
-        let v = volume(h);
-        let (inverse, pressure) = (one / v.j, p[LAMBDA] * v.log);
-        let trace = h[0][0] + h[1][1] + h[2][2];
-        let mut stress = *h;
+        let Strain { t, j, log, .. } = strain(h);
+        let square = j * j;
+        let (mu, pressure) = (p[MU] / square, p[LAMBDA] * log / square);
+        let mut c = t;
+        for (i, row) in c.iter_mut().enumerate() {
+            row[i] = row[i] + L::new(1.0);
+        }
+        let mut pk2 = t;
         for i in 0..3 {
-            for k in 0..3 {
-                let cofactor = v.cofactors[i][k];
-                let (mut shear, mut normal) = (v.j.fma(h[i][k], h[k][i] - cofactor), cofactor - h[k][i]);
-                if i == k {
-                    (shear, normal) = (shear + v.second, normal + one + trace);
-                }
-                stress[i][k] = p[MU].fma(shear, pressure * normal) * inverse;
+            let row = [0, 1, 2].map(|k| cofactor(&c, i, k));
+            for k in i..3 {
+                let strained = row[2].fma(t[2][k], row[1].fma(t[1][k], row[0] * t[0][k]));
+                pk2[i][k] = mu.fma(strained, pressure * row[k]);
+                pk2[k][i] = pk2[i][k];
             }
         }
-        stress
+        add_product(h, &pk2)
     }
 
     #[inline(always)]
     fn energy<L: Lane>(p: &[L; PARAMETERS], h: &Tensor<L>) -> [L; 4] {
         let (zero, half) = (L::new(0.0), L::new(0.5));
-        let v = volume(h);
-        let mut square = zero;
-        for row in h {
-            for entry in row {
-                square = entry.fma(*entry, square);
-            }
-        }
-        [p[MU] * (half * square - v.second + v.rest) + half * p[LAMBDA] * v.log * v.log, zero, zero, zero]
+        let s = strain(h);
+        [half * (p[MU] * (s.rest - s.second) + p[LAMBDA] * s.log * s.log), zero, zero, zero]
     }
 
     #[inline(always)]
@@ -123,8 +122,9 @@ impl Material for NeoHookean {
     }
 }
 
-/// The two other axes, in cyclic order.
+/// A cofactor of a tensor.
 #[inline(always)]
-fn others(i: usize) -> [usize; 2] {
-    [(i + 1) % 3, (i + 2) % 3]
+fn cofactor<L: Lane>(a: &Tensor<L>, row: usize, column: usize) -> L {
+    let [i, j, k, l] = [(row + 1) % 3, (row + 2) % 3, (column + 1) % 3, (column + 2) % 3];
+    a[i][k] * a[j][l] - a[i][l] * a[j][k]
 }
