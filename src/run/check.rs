@@ -113,7 +113,7 @@ fn costs(
     per_step: f64,
 ) -> Result<()> {
     let total: f64 = stages.iter().map(|(_, seconds)| seconds).sum();
-    let steps = ((TURNS_S / (2 * TURNS) as f64 / per_step) as u64).clamp(8, 256);
+    let steps = ((TURNS_S / (2 * TURNS) as f64 / per_step) as u64).clamp(32, 256);
     let mut all = begun(loaded)?;
     let _ = write!(t, "\neffects, their share of the time of a step where the run starts, and what called for them");
     for effect in found {
