@@ -204,7 +204,7 @@ mod tests {
     use super::*;
 
     fn mark(number: usize, at: [f64; 2]) -> Mark<'static> {
-        Mark { number, name: "a < b", group: Some(number), at, filled: number % 2 == 0, strong: false }
+        Mark { number, name: "a < b", group: Some(number), at, filled: number.is_multiple_of(2), strong: false }
     }
 
     #[test]
