@@ -180,13 +180,18 @@ struct Ticks {
     range: [f64; 2],
 }
 
-/// Ticks at 1, 2 and 5 of each decade that has values.
+/// Ticks at 1, 2 and 5 of each decade that has values, or closer ones where these are too few.
 fn ticks(values: impl Iterator<Item = f64>) -> Ticks {
     let (low, high) = values.fold((f64::MAX, f64::MIN_POSITIVE), |(l, h), v| (l.min(v), h.max(v)));
     let range = [low / 1.25, high * 1.25];
-    let decades = (range[0].log10().floor() as i32)..=(range[1].log10().ceil() as i32);
-    let values = decades.flat_map(|d| [1.0, 2.0, 5.0].map(|m| m * 10f64.powi(d)));
-    Ticks { values: values.filter(|v| (range[0]..=range[1]).contains(v)).collect(), range }
+    let at = |steps: &[f64]| -> Vec<f64> {
+        let decades = (range[0].log10().floor() as i32)..=(range[1].log10().ceil() as i32);
+        let values = decades.flat_map(|d| steps.iter().map(move |m| m * 10f64.powi(d)));
+        values.filter(|v| (range[0]..=range[1]).contains(v)).collect()
+    };
+    let few = at(&[1.0, 2.0, 5.0]);
+    let values = if few.len() > 2 { few } else { at(&[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0]) };
+    Ticks { values, range }
 }
 
 /// A round value without needless digits.
@@ -237,6 +242,7 @@ mod tests {
     fn ticks_are_round() {
         let found = ticks([0.3, 40.0].into_iter());
         assert_eq!(found.values, [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0]);
+        assert_eq!(ticks([130.0, 157.0].into_iter()).values, [120.0, 150.0]);
         assert_eq!((plain(0.05), plain(20.0)), ("0.05".to_owned(), "20".to_owned()));
     }
 }

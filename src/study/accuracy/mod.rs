@@ -76,7 +76,8 @@ pub fn accuracy(case: &Path, sets: &[String], options: &Options) -> Result<Study
     }
     bar.finish_and_clear();
     let end = if study.interrupted { "interrupted: the same command goes on" } else { "accuracy.html shows it" };
-    study.text += &format!("\nresults    {}: {end}", options.output.display());
+    let lines = [study.text, format!("results    {}: {end}", options.output.display())];
+    study.text = lines.into_iter().filter(|line| !line.is_empty()).collect::<Vec<_>>().join("\n");
     Ok(study)
 }
 
