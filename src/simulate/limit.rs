@@ -31,7 +31,7 @@ const FAR: f64 = 100.0;
 /// A measured limit of the time step.
 #[derive(Debug, Clone, Copy)]
 pub struct Limit {
-    /// Largest stable step, s.
+    /// Largest stable step, s; far too large where the scene buckles faster than it swings.
     pub dt: f64,
     /// Node that moves most in the fastest oscillation.
     pub node: usize,
@@ -125,12 +125,11 @@ impl Simulation {
 }
 
 impl Oscillation<'_> {
-    /// 2/ω of the fastest oscillation with the mass that a step of `dt` calls for. A scene that buckles has negative ω² as well; they
-    /// are shifted towards zero, so that the iteration does not end there.
+    /// 2/ω of the fastest oscillation with the mass that a step of `dt` calls for; infinite if a scene buckles faster than it swings.
     fn limit(&mut self, dt: f64) -> f64 {
         (self.row.dt, self.row.dt_mid) = (dt, 0.5 * (dt + SLOWLY));
         self.stir();
-        let (mut best, mut since, mut shift) = (0.0, 0, 0.0);
+        let (mut best, mut since) = (0.0, 0);
         for round in 0..MOST_ROUNDS {
             let (force, response) = self.respond();
             // the quotient of Rayleigh, since A times the motion is known from the round before
@@ -139,17 +138,13 @@ impl Oscillation<'_> {
             if round > 0 && square > best * (1.0 + SETTLED) {
                 (best, since) = (square, round);
             }
-            if round > 0 && square < -shift {
-                (shift, since) = (-square, round);
-            }
-            let response: Vec<f64> = response.iter().zip(&self.motion).map(|(r, u)| r + shift * u).collect();
             let most = response.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
             if round > since + PATIENCE || most == 0.0 {
                 best = best.max(square);
                 break;
             }
             self.motion = response.iter().map(|x| x / most).collect();
-            self.inertia = force.iter().zip(&self.inertia).map(|(f, a)| (f + shift * a) / most).collect();
+            self.inertia = force.iter().map(|f| f / most).collect();
         }
         2.0 / best.sqrt()
     }
