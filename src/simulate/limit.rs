@@ -31,7 +31,7 @@ const FAR: f64 = 100.0;
 /// A measured limit of the time step.
 #[derive(Debug, Clone, Copy)]
 pub struct Limit {
-    /// Largest stable step, s.
+    /// Largest stable step, s; far too large where the scene buckles faster than it swings.
     pub dt: f64,
     /// Node that moves most in the fastest oscillation.
     pub node: usize,
@@ -125,7 +125,7 @@ impl Simulation {
 }
 
 impl Oscillation<'_> {
-    /// 2/ω of the fastest oscillation with the mass that a step of `dt` calls for.
+    /// 2/ω of the fastest oscillation with the mass that a step of `dt` calls for; infinite if a scene buckles faster than it swings.
     fn limit(&mut self, dt: f64) -> f64 {
         (self.row.dt, self.row.dt_mid) = (dt, 0.5 * (dt + SLOWLY));
         self.stir();
