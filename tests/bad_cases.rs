@@ -125,7 +125,7 @@ fn set_error(set: &str) -> String {
 fn wrong_overrides_are_named() {
     let cases = [
         ("steps", "--set steps: no `=`: write PATH=VALUE"),
-        ("=1", "--set =1: no `` in a case; allowed: domain,"),
+        ("=1", "--set =1: no `` in a case; allowed: accuracy,"),
         ("steps.3.shear.angle_deg=30", "no entry `3` in the list `steps`, which holds 3, from 0"),
         ("steps.x=30", "no entry `x` in the list `steps`"),
         ("steps.2.shear.angle=30", "no `angle` in `steps.2.shear`; did you mean `angle_deg`?"),

@@ -1,7 +1,7 @@
 //! Which nodes are prescribed, and by how much they move.
 
 use crate::case::Case;
-use crate::case::domain::{Domain, InlineMesh, Specimen};
+use crate::case::domain::{Clamps, Domain, InlineMesh, Specimen};
 use crate::error::{Error, Result};
 use crate::fabric::specimen;
 use crate::mesh::Mesh;
@@ -14,6 +14,8 @@ pub struct Conditions {
     pub nodes: Vec<u32>,
     /// Displacement at full amplitude, mm, three numbers a condition.
     pub targets: Vec<f64>,
+    /// Whether each node of the mesh never moves freely.
+    pub held: Vec<bool>,
 }
 
 impl Conditions {
@@ -27,7 +29,13 @@ impl Conditions {
             Domain::Specimen(specimen) => clamps(specimen, mesh),
             Domain::Mesh(inline) => boxes(inline, mesh)?,
         };
+        let later = matches!(&case.domain, Domain::Specimen(s) if s.clamps == Clamps::AfterPretension);
+        let mut held = vec![false; mesh.nodes.len()];
+        for (node, _) in by_node.iter().filter(|(_, (mask, _))| *mask == 7 && !later) {
+            held[*node] = true;
+        }
         Ok(Self {
+            held,
             nodes: by_node.iter().flat_map(|(node, (mask, _))| [*node as u32, *mask]).collect(),
             targets: by_node.values().flat_map(|(_, target)| *target).collect(),
         })

@@ -231,7 +231,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let first = mesh.first_thread_node();
     let hourglass = case.integration.hourglass_control();
     let solids = Solids::new(mesh, hourglass)?;
-    let threads = Threads::new(mesh, active.bending);
+    let threads = Threads::new(mesh, active.bending, &conditions.held);
     let (hexes, beams, bends) = (solids.headers.len(), threads.thread.len(), threads.pairs.len() / 2);
     let first_thread = first as u32;
 

@@ -38,8 +38,8 @@ pub struct Threads {
 }
 
 impl Threads {
-    /// Tables of a mesh, with or without bends.
-    pub fn new(mesh: &Mesh, bending: bool) -> Self {
+    /// Tables of a mesh, with or without bends; `held` nodes never move freely.
+    pub fn new(mesh: &Mesh, bending: bool, held: &[bool]) -> Self {
         let first = mesh.first_thread_node();
         let nodes = mesh.nodes.len() - first;
         let mut t = Self {
@@ -100,10 +100,11 @@ impl Threads {
                 let stiffness = 2.0 * thread.bending / (0.5 * (l1 + l2));
                 t.bends.extend([stiffness, smoothed(turn)]);
                 t.pairs.extend(pair.map(|b| b as u32));
-                // E ≈ S/4 |v₀/l₁ − v₁ (1/l₁ + 1/l₂) + v₂/l₂|²: row sums of its stiffness
+                // E ≈ S/4 |v₀/l₁ − v₁ (1/l₁ + 1/l₂) + v₂/l₂|²: row sums of its stiffness over nodes that can swing
                 let weights = [1.0 / l1, 1.0 / l1 + 1.0 / l2, 1.0 / l2];
-                let total: f64 = weights.iter().sum();
                 let nodes = [t.ends[2 * pair[0]], t.ends[2 * pair[0] + 1], t.ends[2 * pair[1] + 1]];
+                let swings = nodes.iter().zip(&weights).filter(|(node, _)| !held[**node as usize]);
+                let total: f64 = swings.map(|(_, weight)| weight).sum();
                 t.bend_rows.extend(weights.map(|weight| 0.5 * stiffness * weight * total));
                 t.bend_rows.push(l1);
                 for (place, node) in nodes.into_iter().enumerate() {
