@@ -386,11 +386,11 @@ fn a_scene_without_period_is_reported_too() {
 #[test]
 fn coordinates_beyond_reach_are_refused() {
     let scene = json!({ "mesh": { "threads": [
-        { "name": "a", "nodes": [[0, 0, 0], [251, 0, 0]], "radius_mm": 0.1, "axial_n": 1, "linear_density_tex": 1 }
+        { "name": "a", "nodes": [[0, 0, 0], [502, 0, 0]], "radius_mm": 0.1, "axial_n": 1, "linear_density_tex": 1 }
     ] } });
     let case: Case = serde_json::from_value(with(case(), &[("/domain", scene)])).unwrap();
     let message = build(&case, None).unwrap_err().to_string();
-    assert!(message.contains("251") && message.contains("250"), "{message}");
+    assert!(message.contains("502") && message.contains("250"), "{message}");
 }
 
 #[test]
