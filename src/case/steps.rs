@@ -153,8 +153,8 @@ pub enum Hexahedra {
     /// Eight points.
     #[default]
     Full,
-    /// One point, with hourglass control. Faster, and without the stiffness that eight points give each layer of hexahedra against
-    /// bending of its fibres.
+    /// One point, with hourglass control: cheaper steps, but shorter ones where edges of hexahedra turn away from their mean fibre,
+    /// and layers of hexahedra without the stiffness of their fibres against bending.
     Reduced,
 }
 

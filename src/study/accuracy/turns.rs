@@ -123,6 +123,7 @@ pub const TURNS: &[Turn] = &[
     turn("search interval", "skin × 2", &[(SKIN, Times(2.0))]),
     turn("threads", "1 thread", &[("--threads", To("1"))]),
     turn("backend", "CPU", &[("--backend", To("cpu"))]),
+    turn("integration", "1 point", &[("integration.hexahedra", To("reduced"))]),
     turn("precision", "f64", &[(PRECISION, To("f64"))]),
     turn("mesh", "mesh × 1.4", &[(FINER, Times(1.4))]),
     turn("contact mass", "no contact mass", &[(MASS, To("null"))]),
