@@ -272,7 +272,8 @@ impl Simulation {
         }
         while self.time < until * (1.0 - 1e-12) {
             let (from, steps) = (self.time - self.dt_before, self.step);
-            while self.step < steps + WINDOW && self.time < until * (1.0 - 1e-12) {
+            loop {
+                // rounding may leave a step that is hardly there: the last one of a window is looked at, so it is taken
                 let remaining = ((until - self.time) / self.dt).ceil().max(1.0) as u64;
                 let left = remaining.min(steps + WINDOW - self.step);
                 let burst = left.min(self.burst);

@@ -390,7 +390,7 @@ fn coordinates_beyond_reach_are_refused() {
     ] } });
     let case: Case = serde_json::from_value(with(case(), &[("/domain", scene)])).unwrap();
     let message = build(&case, None).unwrap_err().to_string();
-    assert!(message.contains("502") && message.contains("250"), "{message}");
+    assert!(message.contains("node 0") && message.contains("250"), "{message}");
 }
 
 #[test]

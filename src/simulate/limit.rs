@@ -10,7 +10,7 @@ use crate::kernel::row::Row;
 use crate::kernel::stage::Stage;
 use crate::plan;
 
-/// Friction that holds every contact.
+/// Friction that holds every contact of a scene with friction.
 const STICK: f64 = 1e6;
 /// Largest displacement of a node to either side, mm.
 const REACH: f64 = 1e-6;
@@ -66,7 +66,9 @@ impl Simulation {
                 "the limit of the time step is measured in f64: set integration.precision".into(),
             ));
         }
-        let mut stages = plan::build(&self.case, STICK, &self.mesh, self.capacity)?.plan.step;
+        // without friction there are no buffers for it
+        let friction = if self.friction > 0.0 { STICK } else { 0.0 };
+        let mut stages = plan::build(&self.case, friction, &self.mesh, self.capacity)?.plan.step;
         let moved = self.model.buffers.remainder;
         stages.retain(|stage| stage.writes.iter().all(|(buffer, _)| *buffer != moved));
         let b = &self.model.buffers;
