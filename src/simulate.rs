@@ -103,8 +103,6 @@ pub struct Simulation {
     largest_flow: f64,
     health: Health,
     stress: StressMean,
-    /// Totals in the middle of the last step of a window, and after it.
-    looked: [Vec<f64>; 2],
     /// Half of the work of its motion, which the next look adds, mJ: see [`ledger`].
     owed: [f64; 4],
     /// Time from which prescribed motion acts, s, and whether it does now.
@@ -158,6 +156,12 @@ fn hold_from(case: &Case, schedule: &Schedule) -> f64 {
     }
 }
 
+/// Totals in the middle of the last step of a window, between its forces and its motion, and after it.
+struct Looked {
+    middle: Vec<f64>,
+    after: Vec<f64>,
+}
+
 /// Mean of V P̄ over the steps since it was last taken, N·mm.
 #[derive(Debug, Clone, Copy, Default)]
 struct StressMean {
@@ -206,7 +210,6 @@ impl Simulation {
             largest_flow: 0.0,
             health: Health::default(),
             stress: StressMean::default(),
-            looked: Default::default(),
             owed: [0.0; 4],
             ready: false,
             mesh,
@@ -272,17 +275,16 @@ impl Simulation {
         }
         while self.time < until * (1.0 - 1e-12) {
             let (from, steps) = (self.time - self.dt_before, self.step);
-            loop {
+            let looked = loop {
                 // rounding may leave a step that is hardly there: the last one of a window is looked at, so it is taken
                 let remaining = ((until - self.time) / self.dt).ceil().max(1.0) as u64;
                 let left = remaining.min(steps + WINDOW - self.step);
                 let burst = left.min(self.burst);
-                self.burst(burst, burst == left)?;
-                if burst == left {
-                    break;
+                if let Some(looked) = self.burst(burst, burst == left)? {
+                    break looked;
                 }
-            }
-            self.look(self.step - steps, from, self.time - self.dt)?;
+            };
+            self.look(&looked, self.step - steps, from, self.time - self.dt)?;
             if stop(self) {
                 break;
             }
@@ -307,8 +309,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Some steps, of which the last one may be looked at, then a search if the skin is used up.
-    fn burst(&mut self, steps: u64, looks: bool) -> Result<()> {
+    /// Some steps, then a search if the skin is used up. If the last step is looked at, returns its totals.
+    fn burst(&mut self, steps: u64, looks: bool) -> Result<Option<Looked>> {
         self.hold();
         let mut rows = Vec::with_capacity(steps as usize);
         let mut time = self.time;
@@ -324,9 +326,7 @@ impl Simulation {
         self.backend.run(&self.model.plan.step, &rows[..last]);
         self.time = time;
         self.step += steps;
-        if looks {
-            self.looked_at_step(rows[last])?;
-        }
+        let looked = if looks { Some(self.looked_at_step(rows[last])?) } else { None };
         self.backend.run(&self.model.plan.watch, &rows[..1]);
         let status = self.backend.uints(self.model.buffers.status);
         self.alive()?;
@@ -346,17 +346,18 @@ impl Simulation {
         let sure = (left.min(FARTHEST) / (SPEED_MARGIN * self.speed * self.dt)) as u64;
         let longer = if self.speed > CALM * before { BURST } else { 2 * self.burst };
         self.burst = longer.min(sure).clamp(BURST, WINDOW);
-        Ok(())
+        Ok(looked)
     }
 
     /// A step with its totals in the middle and after it.
-    fn looked_at_step(&mut self, row: Row<f64>) -> Result<()> {
+    fn looked_at_step(&mut self, row: Row<f64>) -> Result<Looked> {
         self.backend.run(&self.model.plan.step[..self.model.forces], &[row]);
         let middle = self.diagnose(row)?;
         self.backend.run(&self.model.plan.step[self.model.forces..], &[row]);
         self.backend.run(&self.model.collect_motion, &[row]);
-        self.looked = [middle, self.backend.scalars(self.model.totals.buffer)];
-        self.alive()
+        let after = self.backend.scalars(self.model.totals.buffer);
+        self.alive()?;
+        Ok(Looked { middle, after })
     }
 
     /// Lets prescribed motion act from its time on, by the masks of its nodes.
@@ -452,12 +453,11 @@ impl Simulation {
     }
 
     /// Energies, limits and guards after a window of `steps` from time `from` to `to`.
-    fn look(&mut self, steps: u64, from: f64, to: f64) -> Result<()> {
-        let [totals, after] = std::mem::take(&mut self.looked);
-        self.add_work(&totals, &after);
-        self.add_contact(&totals);
-        self.add_stress(&totals, steps, from, to);
-        self.set_state(&totals, &after);
+    fn look(&mut self, Looked { middle, after }: &Looked, steps: u64, from: f64, to: f64) -> Result<()> {
+        self.add_work(middle, after);
+        self.add_contact(middle);
+        self.add_stress(middle, steps, from, to);
+        self.set_state(middle, after);
         let e = &self.energies;
         let flow = [e.thermal, e.radius, e.external, e.prescribed, e.gravity].iter().map(|w| w.abs()).sum::<f64>();
         self.largest_flow = self.largest_flow.max(flow + self.start_energy.abs()).max(e.output());

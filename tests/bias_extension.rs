@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{below, near};
+use common::{below, near, options};
 use serde_json::Value;
 use std::f64::consts::SQRT_2;
 use std::fs;
@@ -16,7 +16,7 @@ use tricot::fabric::specimen::clamped;
 use tricot::measure::shear::Bias;
 use tricot::output::columns::Columns;
 use tricot::output::table::{CROSSINGS, HISTORY, SHEAR, YARNS, ZONES};
-use tricot::run::{self, Machine, Options};
+use tricot::run;
 use tricot::simulate::Make;
 
 const CASE: &str = "cases/bias_extension_small.json";
@@ -48,18 +48,7 @@ fn loaded() -> Loaded {
 }
 
 fn ran(output: PathBuf) -> String {
-    let options = Options {
-        output,
-        precision: None,
-        threads: Some(2),
-        machine: Machine::Cpu,
-        adapter: String::new(),
-        force: false,
-        resume: false,
-        from: None,
-        quiet: true,
-    };
-    run::run(&loaded(), &options).unwrap_or_else(|e| panic!("{e}")).text
+    run::run(&loaded(), &options(output, 2)).unwrap_or_else(|e| panic!("{e}")).text
 }
 
 fn rows(dir: &Path, table: &str) -> Columns {

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Random, bare, block, neo_hookean, with};
+use common::{Random, bare, block, neo_hookean, options, with};
 use serde_json::{Value, json};
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,7 +14,7 @@ use tricot::case::domain::Domain;
 use tricot::case::read::{Loaded, read};
 use tricot::error::Error;
 use tricot::output::checkpoint::Checkpoint;
-use tricot::run::{self, Machine, Options};
+use tricot::run::{self, Options};
 use tricot::simulate::Make;
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -257,17 +257,7 @@ fn checkpoints() {
     let folder = tempfile::tempdir().unwrap();
     let case = folder.path().join("case.json");
     fs::write(&case, tiny().to_string()).unwrap();
-    let options = |resume| Options {
-        output: folder.path().join("results"),
-        precision: None,
-        threads: Some(1),
-        machine: Machine::Cpu,
-        adapter: String::new(),
-        force: false,
-        resume,
-        from: None,
-        quiet: true,
-    };
+    let options = |resume| Options { resume, ..options(folder.path().join("results"), 1) };
     let loaded = read(&case, &[]).unwrap();
     run::run(&loaded, &options(false)).unwrap();
     let states = folder.path().join("results/state");

@@ -1,6 +1,9 @@
 //! A cell from pre-tension to 10° of shear on the GPU backend against the CPU, and how runs on a device end. Without an adapter
 //! the tests say so and go on, unless TRICOT_REQUIRE_ADAPTER is set.
 
+mod common;
+
+use common::options;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -149,17 +152,7 @@ fn a_device_that_is_lost_leaves_whole_results() {
     let Some(device) = device() else { return };
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("cell");
-    let options = Options {
-        output: output.clone(),
-        precision: None,
-        threads: None,
-        machine: Machine::Gpu,
-        adapter: String::new(),
-        force: false,
-        resume: false,
-        from: None,
-        quiet: true,
-    };
+    let options = Options { machine: Machine::Gpu, threads: None, ..options(output.clone(), 0) };
     let make = Make { device: Some(Arc::clone(&device)), ..Make::default() };
     let rows = || fs::read_to_string(output.join("history.csv")).unwrap_or_default().lines().count();
     let error = std::thread::scope(|scope| {

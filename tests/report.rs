@@ -1,14 +1,17 @@
 //! The report of a run: one well-formed page that fetches nothing and says what the tables say.
 
+mod common;
+
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use common::options;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
 use tricot::case::read::read;
 use tricot::output::columns::Columns;
-use tricot::run::{Machine, Options, report, run};
+use tricot::run::{report, run};
 
 /// A coarse cell with pictures.
 const SETS: [&str; 10] = [
@@ -28,18 +31,7 @@ fn ran() -> (TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("cell");
     let loaded = read(Path::new("cases/unit_cell_shear.json"), &SETS.map(String::from)).unwrap();
-    let options = Options {
-        output: output.clone(),
-        precision: None,
-        threads: Some(2),
-        machine: Machine::Cpu,
-        adapter: String::new(),
-        force: false,
-        resume: false,
-        from: None,
-        quiet: true,
-    };
-    run(&loaded, &options).unwrap();
+    run(&loaded, &options(output.clone(), 2)).unwrap();
     let text = report(&output, &output.join("report.html")).unwrap();
     assert!(text.contains("report.html written"), "{text}");
     let page = fs::read_to_string(output.join("report.html")).unwrap();

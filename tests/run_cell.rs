@@ -1,15 +1,19 @@
 //! A coarse cell run through the library and through the program: what it leaves on disk, and how it ends.
 
+mod common;
+
+use common::options;
+use common::program::contents;
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tricot::case::read::{Loaded, read};
 use tricot::output::table::{HISTORY, STITCHES, YARNS};
 use tricot::output::vtu_read;
-use tricot::run::{Machine, Options, Outcome, picture, run};
+use tricot::run::{Outcome, picture, run};
 use tricot::simulate::Make;
 
 const CASE: &str = "cases/unit_cell_shear.json";
@@ -33,20 +37,6 @@ fn sets(more: &[&str]) -> Vec<String> {
 
 fn coarse() -> Loaded {
     read(Path::new(CASE), &sets(&[])).unwrap()
-}
-
-fn options(output: PathBuf, threads: usize) -> Options {
-    Options {
-        output,
-        precision: None,
-        threads: Some(threads),
-        machine: Machine::Cpu,
-        adapter: String::new(),
-        force: false,
-        resume: false,
-        from: None,
-        quiet: true,
-    }
 }
 
 fn ran() -> (TempDir, Outcome) {
@@ -73,21 +63,6 @@ fn column(path: &Path, name: &str) -> Vec<f64> {
 
 fn summary(dir: &Path) -> Value {
     serde_json::from_slice(&fs::read(dir.join("summary.json")).unwrap()).unwrap()
-}
-
-/// Every file below a folder with its bytes.
-fn contents(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let mut found = Vec::new();
-    for entry in fs::read_dir(dir).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            found.extend(contents(&path));
-        } else {
-            found.push((path.clone(), fs::read(&path).unwrap()));
-        }
-    }
-    found.sort();
-    found
 }
 
 /// The program on the coarse cell with more overrides.

@@ -154,17 +154,7 @@ fn a_study_says_what_its_runs_say_and_runs_none_of_them_twice() {
         summary["state_hash"].as_str().unwrap().to_owned()
     };
     let sets = ["steps.0.pretension.time_s=8e-5", "steps.1.shear.time_s=5e-5", "resolution.beams_per_lap=64"];
-    let again = run::Options {
-        output: folder.path().join("again"),
-        precision: None,
-        threads: Some(1),
-        machine: Machine::Cpu,
-        adapter: String::new(),
-        force: false,
-        resume: false,
-        from: None,
-        quiet: true,
-    };
+    let again = common::options(folder.path().join("again"), 1);
     run::run(&read(&case, &sets.map(String::from)).unwrap(), &again).unwrap();
     assert_eq!(hash(&again.output), hash(&dir.join("points/beams-2")));
 

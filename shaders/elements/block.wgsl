@@ -120,3 +120,18 @@ fn add_virial(block: u32, lane: u32, q: Tensor, stress: Tensor) {
 }
 #endif
 #endif
+
+#if bound
+// Writes the rows of stiffness of the binary corners.
+fn store_rows(block: u32, lane: u32, rows: array<f32, 8>) {
+    let at = BOUND * block + lane;
+    out[at] = rows[0];
+    out[at + LANES] = rows[1];
+    out[at + 2u * LANES] = rows[3];
+    out[at + 3u * LANES] = rows[2];
+    out[at + 4u * LANES] = rows[4];
+    out[at + 5u * LANES] = rows[5];
+    out[at + 6u * LANES] = rows[7];
+    out[at + 7u * LANES] = rows[6];
+}
+#endif

@@ -268,14 +268,6 @@ fn bound(number: u32) {
             rows[a] = fma(row, volume_here, rows[a]);
         }
     }
-    let at = BOUND * block + lane;
-    out[at] = rows[0];
-    out[at + LANES] = rows[1];
-    out[at + 2u * LANES] = rows[3];
-    out[at + 3u * LANES] = rows[2];
-    out[at + 4u * LANES] = rows[4];
-    out[at + 5u * LANES] = rows[5];
-    out[at + 6u * LANES] = rows[7];
-    out[at + 7u * LANES] = rows[6];
+    store_rows(block, lane, rows);
 }
 #endif

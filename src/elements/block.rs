@@ -162,6 +162,14 @@ impl<'a, L: Lane> Lanes<'a, L> {
         force.store(&mut slots[(3 * corner + component) * LANES + self.lane..]);
     }
 
+    /// Writes the rows of stiffness of the binary corners.
+    #[inline(always)]
+    pub fn store_rows(&self, out: &mut [L::Scalar], rows: &[L; 8]) {
+        for (corner, &binary) in BINARY.iter().enumerate() {
+            rows[binary].store(&mut out[corner * LANES + self.lane..]);
+        }
+    }
+
     /// Adds V P, in the fibre's frame, to the stress sum of a block.
     #[inline(always)]
     pub fn add_virial(&self, io: &Io<L::Scalar>, block: usize, q: &Tensor<L>, stress: &Tensor<L>) {

@@ -7,7 +7,7 @@
 use super::LANES;
 use super::block::{BINARY, Lanes, OUT, Params, cross, dot, total};
 use crate::kernel::lane::Lane;
-use crate::kernel::shader::{Shader, Share};
+use crate::kernel::shader::{Shader, Share, when};
 use crate::kernel::stage::{Io, Kernel};
 use crate::materials::{Material, PARAMETERS, Tensor, jacobian};
 use std::marker::PhantomData;
@@ -290,7 +290,7 @@ impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
-    const SHADER: Shader = Shader { defines: if PERIODIC { &["PERIODIC"] } else { &[] }, ..shader::<M>("force") };
+    const SHADER: Shader = Shader { defines: &[when(PERIODIC, "PERIODIC")], ..shader::<M>("force") };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -373,10 +373,7 @@ impl<M: Material> Kernel for Bound<M> {
                     law: PhantomData,
                 };
                 visit(io, &lanes, nodes as usize, &mut bounds);
-                let out = out.item(0, item);
-                for (corner, &binary) in BINARY.iter().enumerate() {
-                    bounds.rows[binary].store(&mut out[corner * LANES + lane..]);
-                }
+                lanes.store_rows(out.item(0, item), &bounds.rows);
             }
         }
     }

@@ -16,7 +16,7 @@
 use super::LANES;
 use super::block::{BINARY, Lanes, OUT, Params, dot, total};
 use crate::kernel::lane::Lane;
-use crate::kernel::shader::{Shader, Share};
+use crate::kernel::shader::{Shader, Share, when};
 use crate::kernel::stage::{Io, Kernel};
 use crate::materials::{Material, Tensor, jacobian};
 use std::marker::PhantomData;
@@ -156,7 +156,7 @@ const fn shader<M: Material>(kernel: &'static str) -> Shader {
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
-    const SHADER: Shader = Shader { defines: if PERIODIC { &["PERIODIC"] } else { &[] }, ..shader::<M>("force") };
+    const SHADER: Shader = Shader { defines: &[when(PERIODIC, "PERIODIC")], ..shader::<M>("force") };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -304,10 +304,7 @@ impl<M: Material> Kernel for Bound<M> {
                     }
                     add_rows(&mut rows, lanes.shape(STIFFNESS + mode) * total(&sizes), &sizes);
                 }
-                let out = out.item(0, item);
-                for (corner, &binary) in BINARY.iter().enumerate() {
-                    rows[binary].store(&mut out[corner * LANES + lane..]);
-                }
+                lanes.store_rows(out.item(0, item), &rows);
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Case in, results out: owns the plan, the backend, the schedule, the measures and the outputs of one run.
 
 mod check;
+pub mod clock;
 mod crossings;
 mod devices;
 pub mod effects;

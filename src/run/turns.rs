@@ -1,6 +1,7 @@
 //! Times of the step of scenes, taken in turns: whatever else the machine does meets the scenes that are compared alike. On the
 //! CPU a trial has one thread, and what counts is how long that has run, not how long it has waited for a core.
 
+use super::clock;
 use crate::error::Error;
 use crate::simulate::{Make, Simulation};
 use std::sync::LazyLock;
@@ -76,18 +77,8 @@ pub(super) fn wall() -> f64 {
 }
 
 /// Seconds that this thread has run; wall time where the system does not tell.
-#[cfg(unix)]
 fn ran() -> f64 {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: the system writes to a place that is there.
-    let told = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) } == 0;
-    if told { time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64 } else { wall() }
-}
-
-/// Seconds of wall time: the system does not tell how long a thread has run.
-#[cfg(not(unix))]
-fn ran() -> f64 {
-    wall()
+    clock::thread().unwrap_or_else(wall)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use crate::case::steps::Precision;
 use crate::error::{Error, Result};
 use crate::kernel::position::QUANTUM;
 use crate::kernel::row::Row;
-use crate::kernel::stage::Stage;
+use crate::kernel::stage::{Plan, Stage};
 use crate::plan;
 
 /// Friction that holds every contact of a scene with friction.
@@ -68,7 +68,10 @@ impl Simulation {
         }
         // without friction there are no buffers for it
         let friction = if self.friction > 0.0 { STICK } else { 0.0 };
-        let mut stages = plan::build(&self.case, friction, &self.mesh, self.capacity)?.plan.step;
+        let stuck = plan::build(&self.case, friction, &self.mesh, self.capacity)?.plan;
+        let names = |plan: &Plan| plan.buffers.iter().map(|b| (b.name, b.len)).collect::<Vec<_>>();
+        assert_eq!(names(&stuck), names(&self.model.plan), "its stages run on the buffers of this scene");
+        let mut stages = stuck.step;
         let moved = self.model.buffers.remainder;
         stages.retain(|stage| stage.writes.iter().all(|(buffer, _)| *buffer != moved));
         let b = &self.model.buffers;

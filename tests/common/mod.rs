@@ -4,9 +4,10 @@
 pub mod program;
 
 use serde_json::{Value, json};
+use std::path::PathBuf;
 use tricot::case::read::{Loaded, read};
 use tricot::case::steps::Precision;
-use tricot::run;
+use tricot::run::{self, Machine, Options};
 use tricot::simulate::{Make, Simulation};
 
 /// Prints a number beside what it should be, and fails if it is further away than `tolerance` times that (or than
@@ -90,6 +91,21 @@ pub fn held_specimen() -> Value {
             ("/steps", json!([{ "pretension": { "time_s": 1.5e-4 } }, { "move": { "time_s": 1e-4 } }])),
         ],
     )
+}
+
+/// A run on the CPU that leaves its results in a folder and tells nothing.
+pub fn options(output: PathBuf, threads: usize) -> Options {
+    Options {
+        output,
+        precision: None,
+        threads: Some(threads),
+        machine: Machine::Cpu,
+        adapter: String::new(),
+        force: false,
+        resume: false,
+        from: None,
+        quiet: true,
+    }
 }
 
 /// Replaces or adds values at paths such as `/effects/mass_floor`.

@@ -5,7 +5,7 @@
 use crate::case::read::read;
 use crate::case::steps::Precision;
 use crate::error::{Error, Result};
-use crate::run;
+use crate::run::{self, clock};
 use crate::simulate::{Make, Simulation};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -30,7 +30,7 @@ impl Clocks {
     /// Both clocks now, s, from a common moment.
     fn now(start: Instant) -> Self {
         let wall = start.elapsed().as_secs_f64();
-        Self { wall, cpu: cpu_time().unwrap_or(wall) }
+        Self { wall, cpu: clock::process().unwrap_or(wall) }
     }
 
     fn with(self, other: Self, both: impl Fn(f64, f64) -> f64) -> Self {
@@ -47,20 +47,6 @@ impl Clocks {
     fn since(self, before: Self) -> Self {
         self.with(before, |now, before| now - before)
     }
-}
-
-/// Time that this process has had on all processors, s, where the system tells.
-#[cfg(unix)]
-fn cpu_time() -> Option<f64> {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: the pointer is to a value of the type that is asked for.
-    let failed = unsafe { libc::clock_gettime(libc::CLOCK_PROCESS_CPUTIME_ID, &mut time) };
-    (failed == 0).then_some(time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64)
-}
-
-#[cfg(not(unix))]
-fn cpu_time() -> Option<f64> {
-    None
 }
 
 /// A scene to time beside a run, and what has been measured of the run.
