@@ -40,6 +40,11 @@ const BURST: u64 = 8;
 const WINDOW: u64 = 64;
 /// Growth of the largest speed over a burst after which bursts start short again.
 const CALM: f64 = 1.4;
+/// Change of the speed of shear over a window, as a share of it, from which windows are as short as a burst: external work is the mean
+/// stress of a window times its strain, so both must not change together.
+const STEADY: f64 = 0.1;
+/// Energy below which rounding decides its balance, mJ.
+const NOISE: f64 = 1e-6;
 /// Share of the contact skin that nodes may travel before a search.
 const SKIN_USED: f64 = 0.35;
 /// Length over which the affine motion between two searches is counted, mm.
@@ -63,7 +68,7 @@ pub struct Health {
     pub penetration: [f64; 3],
     /// Slave nodes and beams in contact, mean over the last window: threads on yarns, yarns, threads.
     pub touching: [u32; 3],
-    /// Relative error of the energy balance.
+    /// Error of the energy balance over the largest energy so far, or over 1 nJ.
     pub balance: f64,
     /// Estimated limit of the time step without factors, s, and its node.
     pub dt_limit: f64,
@@ -274,11 +279,11 @@ impl Simulation {
             self.begin()?;
         }
         while self.time < until * (1.0 - 1e-12) {
-            let (from, steps) = (self.time - self.dt_before, self.step);
+            let (from, steps, window) = (self.time - self.dt_before, self.step, self.window());
             let looked = loop {
                 // rounding may leave a step that is hardly there: the last one of a window is looked at, so it is taken
                 let remaining = ((until - self.time) / self.dt).ceil().max(1.0) as u64;
-                let left = remaining.min(steps + WINDOW - self.step);
+                let left = remaining.min(steps + window - self.step);
                 let burst = left.min(self.burst);
                 if let Some(looked) = self.burst(burst, burst == left)? {
                     break looked;
@@ -290,6 +295,14 @@ impl Simulation {
             }
         }
         Ok(())
+    }
+
+    /// Steps until the next look at energies.
+    fn window(&self) -> u64 {
+        let rate = |time: f64| self.schedule.row(time, self.dt, self.dt).rate;
+        let (now, then) = (rate(self.time), rate(self.time + WINDOW as f64 * self.dt));
+        let change = largest([0, 1, 2].map(|i| [0, 1, 2].map(|j| then[i][j] - now[i][j])));
+        if change > STEADY * largest(then).max(largest(now)) { BURST } else { WINDOW }
     }
 
     /// First search, first energies, first time step.
@@ -316,7 +329,7 @@ impl Simulation {
         let mut time = self.time;
         for _ in 0..steps {
             let row = self.schedule.row(time, self.dt, self.dt_before);
-            let affine = row.rate.as_flattened().iter().fold(0.0, |most: f64, r| most.max(r.abs()));
+            let affine = largest(row.rate);
             let approach = 2.0 * SPEED_MARGIN * self.speed + 2.0 * affine * AFFINE_REACH;
             rows.push(Row { approach, ..row });
             self.dt_before = self.dt;
@@ -462,7 +475,7 @@ impl Simulation {
         let flow = [e.thermal, e.radius, e.external, e.prescribed, e.gravity].iter().map(|w| w.abs()).sum::<f64>();
         self.largest_flow = self.largest_flow.max(flow + self.start_energy.abs()).max(e.output());
         let error = e.output() - self.start_energy - e.input();
-        self.health.balance = if self.largest_flow > 0.0 { error / self.largest_flow } else { 0.0 };
+        self.health.balance = error / self.largest_flow.max(NOISE);
         self.guards()?;
         self.choose_dt();
         Ok(())
@@ -526,4 +539,9 @@ fn widen(old: &[u8], old_len: usize, fresh: &[u8], model: &Model, beams: usize, 
         new[item * new_row..][..old_row].copy_from_slice(&old[item * old_row..][..old_row]);
     }
     new
+}
+
+/// Largest component of a rate of deformation, 1/s.
+fn largest(rate: [[f64; 3]; 3]) -> f64 {
+    rate.as_flattened().iter().fold(0.0, |most: f64, r| most.max(r.abs()))
 }

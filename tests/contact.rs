@@ -9,6 +9,7 @@ use common::{
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use tricot::case::steps::Precision::{self, F32, F64};
+use tricot::contact::face;
 use tricot::mesh::Mesh;
 use tricot::mesh::surface::Surface;
 use tricot::simulate::Simulation;
@@ -281,6 +282,36 @@ fn a_thread_passes_an_edge_smoothly() {
             allowed,
         );
     }
+}
+
+/// Nodes of surfaces and of threads all around a warped face: inside, over its border and behind it.
+#[test]
+fn a_face_pushes_along_the_gradient_of_the_distance() {
+    let face = [[-0.5, -0.3, 0.0], [0.5, -0.35, 0.05], [0.55, 0.3, -0.04], [-0.45, 0.35, 0.03]];
+    let seen = |point: [f64; 3], is_thread| {
+        let closest = face::closest(&face.map(|corner: [f64; 3]| [0, 1, 2].map(|k| corner[k] - point[k])));
+        Some((closest.normal_and_distance(is_thread)?, closest.interior))
+    };
+    let (mut worst, mut behind_border) = (0.0f64, 0);
+    for (i, j, k) in (0..21).flat_map(|i| (0..17).flat_map(move |j| (0..12).map(move |k| (i, j, k)))) {
+        let point = [-0.8 + 0.08 * f64::from(i), -0.6 + 0.075 * f64::from(j), -0.31 + 0.055 * f64::from(k)];
+        for is_thread in [false, true] {
+            let Some(((direction, distance), interior)) = seen(point, is_thread) else { continue };
+            for axis in 0..3 {
+                let step = 1e-5;
+                let moved = |by: f64| seen([0, 1, 2].map(|k| point[k] + if k == axis { by } else { 0.0 }), is_thread);
+                // next to a border that is seen from one side only there is no derivative
+                let (Some((ahead, a)), Some((back, b))) = (moved(step), moved(-step)) else { continue };
+                if a != interior || b != interior || (ahead.1 - back.1).abs() > 3.0 * step {
+                    continue;
+                }
+                worst = worst.max(((ahead.1 - back.1) / (2.0 * step) - direction[axis]).abs());
+                behind_border += usize::from(!interior && distance < 0.0);
+            }
+        }
+    }
+    assert!(behind_border > 300, "{behind_border}");
+    below("direction of contact against the gradient of the distance by finite differences", worst, 1e-4);
 }
 
 /// Yarns are open at their ends: what slides in there is inside without having passed a side, and no side pushes it out.

@@ -86,11 +86,18 @@ fn difference(ours: &[f64], theirs: &[f64]) -> (f64, usize) {
     (worst, unequal)
 }
 
+/// Mean of the squares of the differences of a list of numbers from exact ones, where these are finite.
+fn mean_square(ours: &[f64], exact: &[f64]) -> f64 {
+    let squares = ours.iter().zip(exact).filter(|(_, e)| e.is_finite()).map(|(x, e)| (x - e).powi(2));
+    let sum: f64 = squares.clone().sum();
+    if sum.is_nan() { f64::INFINITY } else { sum / squares.count().max(1) as f64 }
+}
+
 /// What is allowed of the GPU against the CPU in f32, over the largest number of a buffer.
 const ALLOWED: f64 = 2e-5;
 /// Where f32 itself is further off than that (fibre stress at small strain): the GPU may be so many times further from f64 than
-/// the CPU in f32 is.
-const ROUNDING: f64 = 2.0;
+/// the CPU in f32 is, both in the root mean square. That of one number is a matter of luck, but a wrong one shows in the mean.
+const ROUNDING: f64 = 1.5;
 
 /// What was found of one buffer of one stage.
 #[derive(Default, Clone, Copy)]
@@ -145,7 +152,8 @@ fn compare(device: &Arc<Device>, simulation: &Simulation, found: &mut BTreeMap<(
             let (worst, unequal) = difference(&ours, &theirs);
             let from_f64 = [&ours, &theirs].map(|x| difference(x, &exact).0);
             let entry = found.entry((stage.name, description.name)).or_default();
-            entry.failed |= worst > ALLOWED && from_f64[0] > ROUNDING * from_f64[1];
+            let [gpu, cpu] = [&ours, &theirs].map(|x| mean_square(x, &exact));
+            entry.failed |= worst > ALLOWED && gpu > ROUNDING * ROUNDING * cpu;
             entry.difference = entry.difference.max(worst);
             entry.unequal = entry.unequal.max(unequal);
             entry.from_f64 = [0, 1].map(|i| entry.from_f64[i].max(from_f64[i]));

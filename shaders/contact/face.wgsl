@@ -238,7 +238,7 @@ fn normal_and_distance(point: Closest, is_thread: bool) -> Side {
     if is_thread || height >= 0.0 {
         return Side(true, point.offset * (1.0 / point.distance), point.distance);
     }
-    return Side(-height > 0.7 * point.distance, point.normal, -point.distance);
+    return Side(-height > 0.7 * point.distance, point.offset * (-1.0 / point.distance), -point.distance);
 }
 
 // Weights of the four corners.

@@ -30,7 +30,9 @@ struct Params {
 @group(1) @binding(6) var<storage, read> materials: array<f32>;
 @group(1) @binding(7) var<storage, read_write> out: array<f32>;
 #if PERIODIC
+#if force
 @group(1) @binding(8) var<storage, read_write> out_virial: array<f32>;
+#endif
 #endif
 
 // A hexahedron: where its numbers start in the tables.
@@ -88,11 +90,13 @@ fn displacement(h: Hex, corner: u32, from_quanta: vec3<i32>, from_remainder: vec
     return vec3<f32>(node_quanta(node) - from_quanta) * QUANTUM + (node_remainder(node) - from_remainder);
 }
 
+#if PERIODIC
 // The macroscopic gradient in the fibre's frame, Qᵀ A Q.
 fn macroscopic(q: Tensor) -> Tensor {
     let g = gradient();
     return (q * Tensor(g[0], g[1], g[2])) * transpose(q);
 }
+#endif
 
 #if force
 // Writes three components, a lane apart.

@@ -86,8 +86,13 @@ fn others(point: u32) -> vec3<u32> {
     return vec3<u32>(j + 2u * k, i + 2u * k, i + 2u * j);
 }
 
+#if PERIODIC
+// The macroscopic gradient in the frame of the fibre at hand.
+var<private> added: Tensor;
+#endif
+
 // H at a Gauss point.
-fn gradient_at(h: Hex, point: u32, d: ptr<function, Derivatives>, add: Tensor) -> Tensor {
+fn gradient_at(h: Hex, point: u32, d: ptr<function, Derivatives>) -> Tensor {
     let at = others(point);
     let x = (*d).x[at.x];
     let y = (*d).y[at.y];
@@ -95,11 +100,16 @@ fn gradient_at(h: Hex, point: u32, d: ptr<function, Derivatives>, add: Tensor) -
     let a = inverse(h, point, 0u);
     let b = inverse(h, point, 1u);
     let c = inverse(h, point, 2u);
-    return Tensor(
-        fma(z.xxx, c, fma(y.xxx, b, x.x * a)) + add[0],
-        fma(z.yyy, c, fma(y.yyy, b, x.y * a)) + add[1],
-        fma(z.zzz, c, fma(y.zzz, b, x.z * a)) + add[2],
+    let seen = Tensor(
+        fma(z.xxx, c, fma(y.xxx, b, x.x * a)),
+        fma(z.yyy, c, fma(y.yyy, b, x.y * a)),
+        fma(z.zzz, c, fma(y.zzz, b, x.z * a)),
     );
+#if PERIODIC
+    return seen + added;
+#else
+    return seen;
+#endif
 }
 
 #if force
@@ -114,10 +124,9 @@ fn add_point(
     point: u32,
     p: array<f32, PARAMETERS>,
     d: ptr<function, Derivatives>,
-    add: Tensor,
     sum: ptr<function, Sum>,
 ) {
-    let weighted = stress(p, gradient_at(h, point, d, add)) * volume(h, point);
+    let weighted = stress(p, gradient_at(h, point, d)) * volume(h, point);
 #if PERIODIC
     (*sum).stress = (*sum).stress + weighted;
 #endif
@@ -133,17 +142,19 @@ fn force(number: u32) {
     let h = hex(block, lane);
     let q = frame(h);
     let p = material(h);
-    let add = macroscopic(q);
+#if PERIODIC
+    added = macroscopic(q);
+#endif
     var d = derivatives(h, q);
     var sum = Sum();
-    add_point(h, 0u, p, &d, add, &sum);
-    add_point(h, 1u, p, &d, add, &sum);
-    add_point(h, 2u, p, &d, add, &sum);
-    add_point(h, 3u, p, &d, add, &sum);
-    add_point(h, 4u, p, &d, add, &sum);
-    add_point(h, 5u, p, &d, add, &sum);
-    add_point(h, 6u, p, &d, add, &sum);
-    add_point(h, 7u, p, &d, add, &sum);
+    add_point(h, 0u, p, &d, &sum);
+    add_point(h, 1u, p, &d, &sum);
+    add_point(h, 2u, p, &d, &sum);
+    add_point(h, 3u, p, &d, &sum);
+    add_point(h, 4u, p, &d, &sum);
+    add_point(h, 5u, p, &d, &sum);
+    add_point(h, 6u, p, &d, &sum);
+    add_point(h, 7u, p, &d, &sum);
     let x = spread(sum.forces.x);
     let y = spread(sum.forces.y);
     let z = spread(sum.forces.z);
@@ -170,12 +181,14 @@ fn energy(number: u32) {
     let h = hex(block, lane);
     let q = frame(h);
     let p = material(h);
-    let add = macroscopic(q);
+#if PERIODIC
+    added = macroscopic(q);
+#endif
     var d = derivatives(h, q);
     var sum = vec4<f32>();
     var smallest = 1e30;
     for (var point = 0u; point < 8u; point++) {
-        let here = gradient_at(h, point, &d, add);
+        let here = gradient_at(h, point, &d);
         sum = fma(energies(p, here), vec4<f32>(volume(h, point)), sum);
         smallest = min(smallest, jacobian(here));
     }
@@ -216,8 +229,11 @@ fn edges(h: Hex, q: Tensor) -> array<vec3<f32>, 4> {
 }
 
 // Sine of the angle between a fibre at a Gauss point and an edge, from the edge at rest and its change.
-fn sine_between(rest: vec3<f32>, change: vec3<f32>, fibre: vec3<f32>, add: Tensor) -> f32 {
-    let now = rest + vec3<f32>(dot(add[0], rest), dot(add[1], rest), dot(add[2], rest)) + change;
+fn sine_between(rest: vec3<f32>, change: vec3<f32>, fibre: vec3<f32>) -> f32 {
+    var now = rest + change;
+#if PERIODIC
+    now = now + vec3<f32>(dot(added[0], rest), dot(added[1], rest), dot(added[2], rest));
+#endif
     let turned = cross(now, fibre);
     return sqrt(dot(turned, turned) / (dot(now, now) * dot(fibre, fibre)));
 }
@@ -228,14 +244,16 @@ fn bound(number: u32) {
     let h = hex(block, lane);
     let q = frame(h);
     let p = material(h);
-    let add = macroscopic(q);
+#if PERIODIC
+    added = macroscopic(q);
+#endif
     var d = derivatives(h, q);
     var changes = edges(h, q);
     let explicit_fibres = params.left == 0.0;
     let factor = select(params.left, 1.0, explicit_fibres);
     var rows = array<f32, 8>();
     for (var point = 0u; point < 8u; point++) {
-        let here = gradient_at(h, point, &d, add);
+        let here = gradient_at(h, point, &d);
         let fibre = vec3<f32>(1.0 + here[0].x, here[1].x, here[2].x);
         let side = cross(inverse(h, point, 1u), inverse(h, point, 2u));
         let rest = side / dot(inverse(h, point, 0u), side);
@@ -249,7 +267,7 @@ fn bound(number: u32) {
             let high = slope_at(h, point, 2u * edge + 1u);
             var sizes = abs(vec2<f32>(low.x, high.x));
             if !explicit_fibres {
-                let sine = sine_between(rest, changes[edge], fibre, add);
+                let sine = sine_between(rest, changes[edge], fibre);
                 sizes = vec2<f32>(fma(sine, abs(0.5 * (high.x - low.x)), abs(0.5 * (high.x + low.x))));
             }
             slopes[2u * edge] = abs(low);

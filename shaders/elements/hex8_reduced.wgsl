@@ -97,7 +97,11 @@ fn deformation(h: Hex, q: Tensor) -> Deformation {
         unseen(h, 2u, low + high, mixed),
         unseen(h, 3u, high - low, mixed),
     );
+#if PERIODIC
     return Deformation(macroscopic(q) + mixed * transpose(q), modes);
+#else
+    return Deformation(mixed * transpose(q), modes);
+#endif
 }
 
 #if force

@@ -363,16 +363,21 @@ impl<R: Real> Closest<R> {
     /// Direction in which the slave is pushed, and signed distance of the slave point from the surface, mm; `None` where the
     /// point lies beside the border of a face it has passed under. The middle of a thread is never inside a body: if the
     /// border is closest, it is outside, whatever side of the face's plane it is on.
+    ///
+    /// The direction is the gradient of the distance, so that contact has an energy: a node behind a fold is pushed to the fold, not along
+    /// the normal of either face, where it would rattle between the two and gain energy with every change.
     #[inline(always)]
     pub fn normal_and_distance(&self, is_thread: bool) -> Option<(Vector<R>, R)> {
         let height = self.height();
         if self.interior || self.distance < R::from_f64(1e-6) {
             return Some((self.normal, height));
         }
+        let one = R::from_f64(1.0);
         if is_thread || height >= R::from_f64(0.0) {
-            return Some((scale(self.offset, R::from_f64(1.0) / self.distance), self.distance));
+            return Some((scale(self.offset, one / self.distance), self.distance));
         }
-        (-height > R::from_f64(0.7) * self.distance).then_some((self.normal, -self.distance))
+        let is_under = -height > R::from_f64(0.7) * self.distance;
+        is_under.then(|| (scale(self.offset, -one / self.distance), -self.distance))
     }
 
     /// Weights of the four corners.

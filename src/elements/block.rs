@@ -102,10 +102,10 @@ impl<'a, L: Lane> Lanes<'a, L> {
         [[q[0], q[1], q[2]], [q[3], q[4], q[5]], [q[6], q[7], q[8]]]
     }
 
-    /// The macroscopic gradient F̄ − I in the fibre's frame.
+    /// The macroscopic gradient F̄ − I in the fibre's frame, of a periodic scene.
     #[inline(always)]
-    pub fn macroscopic(&self, io: &Io<L::Scalar>) -> Tensor<L> {
-        splat_tensor(&turn(&self.scalar_frame(io), &io.row.gradient, false))
+    pub fn macroscopic<const PERIODIC: bool>(&self, io: &Io<L::Scalar>) -> Option<Tensor<L>> {
+        PERIODIC.then(|| splat_tensor(&turn(&self.scalar_frame(io), &io.row.gradient, false)))
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 //!
 //! The derivatives of the trilinear shape functions are products of one-dimensional factors: they are taken direction by
 //! direction (sum factorisation), which costs a third of the textbook sum over corners. Displacements are turned into the
-//! fibre's frame first; a macroscopic gradient F̄ − I is added to H.
+//! fibre's frame first; in periodic scenes the macroscopic gradient F̄ − I is added to H.
 
 use super::LANES;
 use super::block::{BINARY, Lanes, OUT, Params, cross, dot, total};
@@ -29,9 +29,9 @@ type Derivatives<L> = [[[L; 4]; 3]; 3];
 /// Nodal forces of hexahedra; with `PERIODIC`, also the sum of stress for the homogenised first Piola stress.
 pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
 /// Energies by mode and smallest Jacobian.
-pub struct Energy<M>(PhantomData<M>);
+pub struct Energy<M, const PERIODIC: bool>(PhantomData<M>);
 /// Row sums of the stiffness that fibre lines do not cover, see [`crate::dynamics::time_step`].
-pub struct Bound<M>(PhantomData<M>);
+pub struct Bound<M, const PERIODIC: bool>(PhantomData<M>);
 
 /// Displacements of the corners relative to the first, in the fibre's frame, by component and binary corner.
 #[inline(always)]
@@ -132,8 +132,9 @@ fn corner_forces<L: Lane>(g: &[[L; 4]; 3]) -> [L; 8] {
 }
 
 /// The twin of a kernel for a law, one lane an invocation.
-const fn shader<M: Material>(kernel: &'static str) -> Shader {
-    Shader { law: Some(M::SHADER), share: Share::Invocations(LANES), ..Shader::new("elements/hex8", kernel) }
+const fn shader<M: Material, const PERIODIC: bool>(kernel: &'static str) -> Shader {
+    let defines = const { &[when(PERIODIC, "PERIODIC")] };
+    Shader { law: Some(M::SHADER), share: Share::Invocations(LANES), defines, ..Shader::new("elements/hex8", kernel) }
 }
 
 /// Something to do at each Gauss point of one register of hexahedra.
@@ -143,15 +144,22 @@ trait Visitor<L: Lane> {
 
 /// Visits the Gauss points of one register of hexahedra with H, and with the volume of the point.
 #[inline(always)]
-fn visit<L: Lane>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize, visitor: &mut impl Visitor<L>) {
+fn visit<L: Lane, const PERIODIC: bool>(
+    io: &Io<L::Scalar>,
+    lanes: &Lanes<L>,
+    nodes: usize,
+    visitor: &mut impl Visitor<L>,
+) {
     let u = local_displacements(io, lanes, nodes);
     let d = [derivatives(&u[0]), derivatives(&u[1]), derivatives(&u[2])];
-    let macroscopic = lanes.macroscopic(io);
+    let macroscopic = lanes.macroscopic::<PERIODIC>(io);
     for point in 0..8 {
         let mut h = gradient(lanes, point, &d);
-        for i in 0..3 {
-            for j in 0..3 {
-                h[i][j] = h[i][j] + macroscopic[i][j];
+        if let Some(macroscopic) = &macroscopic {
+            for i in 0..3 {
+                for j in 0..3 {
+                    h[i][j] = h[i][j] + macroscopic[i][j];
+                }
             }
         }
         visitor.point(lanes, point, &h, lanes.shape(POINT * point + VOLUME));
@@ -214,7 +222,7 @@ struct Bounds<L: Lane, M> {
     rows: [L; 8],
     /// Displacement of the high against the low corner of the four edges along ξ, by component.
     edges: [[L; 4]; 3],
-    macroscopic: Tensor<L>,
+    macroscopic: Option<Tensor<L>>,
     /// See [`super::block::Params::left`].
     left: f32,
     law: PhantomData<M>,
@@ -237,8 +245,12 @@ impl<L: Lane, M: Material> Bounds<L, M> {
         for edge in 0..4 {
             let mut now = rest;
             for i in 0..3 {
-                let m = &self.macroscopic[i];
-                now[i] = rest[i] + m[2].fma(rest[2], m[1].fma(rest[1], m[0].fma(rest[0], self.edges[i][edge])));
+                let mut change = self.edges[i][edge];
+                if let Some(macroscopic) = &self.macroscopic {
+                    let m = &macroscopic[i];
+                    change = m[2].fma(rest[2], m[1].fma(rest[1], m[0].fma(rest[0], change)));
+                }
+                now[i] = rest[i] + change;
             }
             let turned = cross(&now, &fibre);
             let sine = (dot(&turned, &turned) / (dot(&now, &now) * dot(&fibre, &fibre))).sqrt();
@@ -290,7 +302,7 @@ impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
-    const SHADER: Shader = Shader { defines: &[when(PERIODIC, "PERIODIC")], ..shader::<M>("force") };
+    const SHADER: Shader = shader::<M, PERIODIC>("force");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -306,7 +318,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
                     sum: [[zero; 3]; 3],
                     law: PhantomData,
                 };
-                visit(io, &lanes, nodes as usize, &mut stress);
+                visit::<_, PERIODIC>(io, &lanes, nodes as usize, &mut stress);
                 let q = lanes.frame(io);
                 let f = &stress.forces;
                 let local = [corner_forces(&f[0]), corner_forces(&f[1]), corner_forces(&f[2])];
@@ -326,8 +338,8 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
     }
 }
 
-impl<M: Material> Kernel for Energy<M> {
-    const SHADER: Shader = shader::<M>("energy");
+impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
+    const SHADER: Shader = shader::<M, PERIODIC>("energy");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -342,7 +354,7 @@ impl<M: Material> Kernel for Energy<M> {
                     smallest: L::new(1e30),
                     law: PhantomData,
                 };
-                visit(io, &lanes, nodes as usize, &mut energies);
+                visit::<_, PERIODIC>(io, &lanes, nodes as usize, &mut energies);
                 let out = out.item(0, item);
                 for (mode, sum) in energies.sum.iter().enumerate() {
                     sum.store(&mut out[mode * LANES + lane..]);
@@ -353,8 +365,8 @@ impl<M: Material> Kernel for Energy<M> {
     }
 }
 
-impl<M: Material> Kernel for Bound<M> {
-    const SHADER: Shader = shader::<M>("bound");
+impl<M: Material, const PERIODIC: bool> Kernel for Bound<M, PERIODIC> {
+    const SHADER: Shader = shader::<M, PERIODIC>("bound");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -368,11 +380,11 @@ impl<M: Material> Kernel for Bound<M> {
                     material: lanes.material(io),
                     rows: [L::new(0.0); 8],
                     edges: u.map(|u| [u[1] - u[0], u[3] - u[2], u[5] - u[4], u[7] - u[6]]),
-                    macroscopic: lanes.macroscopic(io),
+                    macroscopic: lanes.macroscopic::<PERIODIC>(io),
                     left,
                     law: PhantomData,
                 };
-                visit(io, &lanes, nodes as usize, &mut bounds);
+                visit::<_, PERIODIC>(io, &lanes, nodes as usize, &mut bounds);
                 lanes.store_rows(out.item(0, item), &bounds.rows);
             }
         }

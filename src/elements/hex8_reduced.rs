@@ -46,9 +46,9 @@ const OUT_HOURGLASS: usize = OUT + 1;
 /// Nodal forces of hexahedra; with `PERIODIC`, also the sum of stress for the homogenised first Piola stress.
 pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
 /// Energies by mode and Jacobian; energy of the hourglass modes.
-pub struct Energy<M>(PhantomData<M>);
+pub struct Energy<M, const PERIODIC: bool>(PhantomData<M>);
 /// Row sums of the stiffness that fibre lines do not cover.
-pub struct Bound<M>(PhantomData<M>);
+pub struct Bound<M, const PERIODIC: bool>(PhantomData<M>);
 
 /// Half the difference and half the sum of B at both ends of an edge along ξ: strain of fibres comes from differences of near
 /// nodes, which f32 does not round.
@@ -115,7 +115,7 @@ struct Deformation<L> {
 }
 
 #[inline(always)]
-fn deformation<L: Lane>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize) -> Deformation<L> {
+fn deformation<L: Lane, const PERIODIC: bool>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize) -> Deformation<L> {
     let zero = L::new(0.0);
     let u = lanes.displacements(io, nodes);
     let edges = [edges(&u[0]), edges(&u[1]), edges(&u[2])];
@@ -139,7 +139,7 @@ fn deformation<L: Lane>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize) -> D
         }
     }
     let q = lanes.frame(io);
-    let mut h = lanes.macroscopic(io);
+    let mut h = lanes.macroscopic::<PERIODIC>(io).unwrap_or([[zero; 3]; 3]);
     for i in 0..3 {
         for j in 0..3 {
             for k in 0..3 {
@@ -151,12 +151,13 @@ fn deformation<L: Lane>(io: &Io<L::Scalar>, lanes: &Lanes<L>, nodes: usize) -> D
 }
 
 /// The twin of a kernel for a law, one lane an invocation.
-const fn shader<M: Material>(kernel: &'static str) -> Shader {
-    Shader { law: Some(M::SHADER), share: Share::Invocations(LANES), ..Shader::new("elements/hex8_reduced", kernel) }
+const fn shader<M: Material, const PERIODIC: bool>(kernel: &'static str) -> Shader {
+    let (defines, share) = (const { &[when(PERIODIC, "PERIODIC")] }, Share::Invocations(LANES));
+    Shader { law: Some(M::SHADER), share, defines, ..Shader::new("elements/hex8_reduced", kernel) }
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
-    const SHADER: Shader = Shader { defines: &[when(PERIODIC, "PERIODIC")], ..shader::<M>("force") };
+    const SHADER: Shader = shader::<M, PERIODIC>("force");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -165,7 +166,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
                 let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
-                let state = deformation(io, &lanes, nodes as usize);
+                let state = deformation::<_, PERIODIC>(io, &lanes, nodes as usize);
                 let volume = lanes.shape(VOLUME);
                 let mut stress = M::stress(&lanes.material(io), &state.h);
                 for p in stress.as_flattened_mut() {
@@ -208,8 +209,8 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
     }
 }
 
-impl<M: Material> Kernel for Energy<M> {
-    const SHADER: Shader = shader::<M>("energy");
+impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
+    const SHADER: Shader = shader::<M, PERIODIC>("energy");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -219,7 +220,7 @@ impl<M: Material> Kernel for Energy<M> {
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
                 let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
-                let state = deformation(io, &lanes, nodes as usize);
+                let state = deformation::<_, PERIODIC>(io, &lanes, nodes as usize);
                 let out = out.item(0, item);
                 for (mode, w) in M::energy(&lanes.material(io), &state.h).into_iter().enumerate() {
                     (w * lanes.shape(VOLUME)).store(&mut out[mode * LANES + lane..]);
@@ -243,8 +244,8 @@ fn add_rows<L: Lane>(rows: &mut [L; 8], k_total: L, sizes: &[L; 8]) {
     }
 }
 
-impl<M: Material> Kernel for Bound<M> {
-    const SHADER: Shader = shader::<M>("bound");
+impl<M: Material, const PERIODIC: bool> Kernel for Bound<M, PERIODIC> {
+    const SHADER: Shader = shader::<M, PERIODIC>("bound");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -253,7 +254,7 @@ impl<M: Material> Kernel for Bound<M> {
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
                 let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
-                let Deformation { h, modes } = deformation(io, &lanes, nodes as usize);
+                let Deformation { h, modes } = deformation::<_, PERIODIC>(io, &lanes, nodes as usize);
                 let zero = L::new(0.0);
                 let mut rows = [zero; 8];
                 // modulus × V |B_a| Σ|B|

@@ -57,36 +57,39 @@ impl HexBuffers {
         for (law, range) in &solids.laws {
             let blocks = Blocks { range: range.clone(), reads, params };
             match law {
-                Law::Charmetant => buffers.stages::<Charmetant>(b, &blocks),
-                Law::NeoHookean => buffers.stages::<NeoHookean>(b, &blocks),
+                Law::Charmetant => buffers.law::<Charmetant>(b, &blocks),
+                Law::NeoHookean => buffers.law::<NeoHookean>(b, &blocks),
             }
         }
         buffers
     }
 
-    fn stages<M: Material>(&self, b: &mut Builder, blocks: &Blocks) {
+    fn law<M: Material>(&self, b: &mut Builder, blocks: &Blocks) {
+        match self.virial {
+            Some(_) => self.stages::<M, true>(b, blocks),
+            None => self.stages::<M, false>(b, blocks),
+        }
+    }
+
+    fn stages<M: Material, const PERIODIC: bool>(&self, b: &mut Builder, blocks: &Blocks) {
         let force = (self.force, own(1, SLOTS));
         let forces: Vec<_> = [force].into_iter().chain(self.virial.map(|v| (v, own(1, VIRIAL)))).collect();
         let energies: Vec<_> = self.energy.map(|e| (e, own(1, ENERGY))).into_iter().collect();
         let bounds = [(self.bound, own(1, BOUND))];
-        let [step, energy, bound] = match (self.hourglass, self.virial) {
-            (Some(hourglass), virial) => {
+        let [step, energy, bound] = match self.hourglass {
+            Some(hourglass) => {
                 let energies = [&energies[..], &[(hourglass, own(1, hex8_reduced::HOURGLASS))]].concat();
-                let step = match virial {
-                    Some(_) => blocks.stage::<hex8_reduced::Force<M, true>>("hex8 reduced", &forces),
-                    None => blocks.stage::<hex8_reduced::Force<M, false>>("hex8 reduced", &forces),
-                };
-                let energy = blocks.stage::<hex8_reduced::Energy<M>>("hex8 reduced energy", &energies);
-                [step, energy, blocks.stage::<hex8_reduced::Bound<M>>("hex8 reduced bound", &bounds)]
+                [
+                    blocks.stage::<hex8_reduced::Force<M, PERIODIC>>("hex8 reduced", &forces),
+                    blocks.stage::<hex8_reduced::Energy<M, PERIODIC>>("hex8 reduced energy", &energies),
+                    blocks.stage::<hex8_reduced::Bound<M, PERIODIC>>("hex8 reduced bound", &bounds),
+                ]
             }
-            (None, virial) => {
-                let step = match virial {
-                    Some(_) => blocks.stage::<hex8::Force<M, true>>("hex8", &forces),
-                    None => blocks.stage::<hex8::Force<M, false>>("hex8", &forces),
-                };
-                let energy = blocks.stage::<hex8::Energy<M>>("hex8 energy", &energies);
-                [step, energy, blocks.stage::<hex8::Bound<M>>("hex8 bound", &bounds)]
-            }
+            None => [
+                blocks.stage::<hex8::Force<M, PERIODIC>>("hex8", &forces),
+                blocks.stage::<hex8::Energy<M, PERIODIC>>("hex8 energy", &energies),
+                blocks.stage::<hex8::Bound<M, PERIODIC>>("hex8 bound", &bounds),
+            ],
         };
         b.plan.step.push(step);
         b.plan.diagnose.extend([energy, bound]);

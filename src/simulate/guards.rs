@@ -29,8 +29,7 @@ impl Simulation {
             ));
         }
         let tolerance = self.case.integration.energy_tolerance;
-        // below a nJ rounding decides
-        if h.balance.abs() > tolerance && self.largest_flow > 1e-6 {
+        if h.balance.abs() > tolerance {
             let culprit = format!(
                 "the energy balance is off by {:.1} % (tolerance {:.1} %)",
                 100.0 * h.balance,

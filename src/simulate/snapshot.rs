@@ -1,7 +1,9 @@
 //! The whole state of a scene as bytes, and a scene that goes on from it to the same bits.
 
 use super::{Energies, Health, Simulation, StressMean, WINDOW};
+use crate::contact::penalty::SLOT_KEYS;
 use crate::contact::threads::MOST_PAIRS;
+use crate::contact::{Body, EMPTY, of_key, status};
 use crate::error::{Error, Result};
 use crate::kernel::buffer::{Buffer, Initial};
 use crate::kernel::record::{Record, Recorded};
@@ -149,6 +151,9 @@ impl Simulation {
             return Err(Error::geometry("a state of another scene", "its record on the host has another length"));
         }
         self.check_record()?;
+        for (buffer, bytes) in changing.iter().zip(contents) {
+            self.check_indices(*buffer, bytes)?;
+        }
         for (buffer, bytes) in changing.into_iter().zip(contents) {
             self.backend.set_bytes(buffer, bytes);
         }
@@ -170,6 +175,41 @@ impl Simulation {
         within(self.speed >= 0.0, "speed", self.speed)?;
         within((1..=WINDOW).contains(&self.burst), "burst", self.burst as f64)?;
         within(self.step <= u64::MAX / 2, "number of steps", self.step as f64)
+    }
+
+    /// Refuses places in tables that the scene does not have.
+    fn check_indices(&self, buffer: Buffer, bytes: &[u8]) -> Result<()> {
+        let b = &self.model.buffers;
+        let numbers = || -> Vec<u32> { bytemuck::pod_collect_to_vec(bytes) };
+        let damaged = |what: &str, at: usize| {
+            let message = format!("{what} {at} of {:?} is in no table", self.model.plan.buffers[buffer.0].name);
+            Err(Error::geometry("a damaged state", message))
+        };
+        if Some(buffer) == b.contact_keys {
+            let tables = &self.model.plan.buffers;
+            let bodies: Vec<Body> = match tables.iter().find(|table| table.name == "bodies").map(|table| &table.initial)
+            {
+                Some(Initial::Uint(bodies)) => bytemuck::pod_collect_to_vec(bodies),
+                _ => vec![],
+            };
+            let is_there = |slot: &[u32]| {
+                let Some(body) = bodies.get(of_key(slot[0]).0) else { return false };
+                slot[1] < body.ring && (body.closed == 1 || slot[2] < body.slices)
+            };
+            let bad = |slot: &[u32]| slot[0] != EMPTY && !is_there(slot);
+            if let Some(at) = numbers().chunks_exact(SLOT_KEYS).position(bad) {
+                return damaged("the face of slot", at);
+            }
+        } else if Some(buffer) == b.pair_keys {
+            let beams = self.mesh.beams();
+            let bad = |key: &u32| *key != EMPTY && of_key(*key).0 >= beams;
+            if let Some(at) = numbers().iter().position(bad) {
+                return damaged("the beam of slot", at);
+            }
+        } else if buffer == b.status && numbers()[status::CULPRIT] as usize >= self.mesh.nodes.len() {
+            return damaged("the node at place", status::CULPRIT);
+        }
+        Ok(())
     }
 
     /// Buffers that hold more than constants: what persists, and what the last steps left for tables and frames.
