@@ -319,22 +319,27 @@ fn a_face_pushes_along_the_gradient_of_the_distance() {
 fn what_enters_through_an_open_end_is_not_pushed_out() {
     let yarn = block("yarn", [8, 2, 1], [[0.0, 0.0, 0.0], [2.0, 1.0, 0.4]], 1e-9, neo_hookean(10.0, 0.3));
     let slider = block("slider", [4, 2, 1], [[-1.2, 0.2, 0.32], [-0.2, 0.8, 0.72]], 1e-9, neo_hookean(10.0, 0.3));
+    let thread = json!({ "name": "slider", "nodes": [[-1.2, 0.5, 0.2], [-0.7, 0.5, 0.2], [-0.2, 0.5, 0.2]],
+                         "radius_mm": 0.05, "axial_n": 1, "linear_density_tex": 10 });
     let whole =
         |body: &str, x: f64| json!({ "within": [[-9, -9, -9], [9, 9, 9]], "body": body, "displacement_mm": [x, 0, 0] });
-    let case = with(
-        scene(json!([yarn, slider]), json!({})),
-        &[
-            ("/domain/mesh/conditions", json!([whole("yarn", 0.0), whole("slider", 0.7)])),
-            ("/steps", json!([{ "move": { "time_s": 2e-4 } }])),
-            ("/integration", json!({ "dt_max_s": 2e-7 })),
-        ],
-    );
-    let mut simulation = start(&case, F64);
-    advance(&mut simulation, 2e-4);
-    let tip = positions(&simulation).iter().map(|x| x[0]).fold(f64::NEG_INFINITY, f64::max);
-    assert!(tip == 2.0 && simulation.health().touching == [0; 3], "{:?}", simulation.health());
-    assert_eq!(simulation.energies().contact, 0.0);
-    assert!(field(&simulation, "contact_force_n").iter().all(|f| *f == 0.0));
+    for (blocks, threads) in [(json!([yarn, slider]), json!([])), (json!([yarn]), json!([thread]))] {
+        let case = with(
+            scene(blocks, json!({})),
+            &[
+                ("/domain/mesh/threads", threads),
+                ("/domain/mesh/conditions", json!([whole("yarn", 0.0), whole("slider", 0.7)])),
+                ("/steps", json!([{ "move": { "time_s": 2e-4 } }])),
+                ("/integration", json!({ "dt_max_s": 2e-7 })),
+            ],
+        );
+        let mut simulation = start(&case, F64);
+        advance(&mut simulation, 2e-4);
+        let furthest = positions(&simulation).iter().map(|x| x[0]).fold(f64::NEG_INFINITY, f64::max);
+        assert!(furthest == 2.0 && simulation.health().touching == [0; 3], "{:?}", simulation.health());
+        assert_eq!(simulation.energies().contact, 0.0);
+        assert!(field(&simulation, "contact_force_n").iter().all(|f| *f == 0.0));
+    }
 }
 
 #[test]

@@ -325,11 +325,15 @@ fn examine(numbers: &[f64], margins: &mut Margins) -> Option<End> {
     let beside = before.iter().zip(&masses).chain(pairs());
     let kinetic: f64 = beside.map(|(v, m)| 0.25 * m * dot(*v, *v)).sum();
     margins.hold("kinetic energy", (kinetic - e.kinetic).abs() / scale, 1e-5, &mut broken);
+    let forces = common::forces(&s);
+    // whatever inertia is added: internal forces move nothing as a whole
+    let sum = forces.iter().fold([0.0; 3], |sum, f| [0, 1, 2].map(|k| sum[k] + f[k]));
+    margins.hold("sum of forces", norm(sum) / forces.iter().map(|f| norm(*f)).sum::<f64>(), 1e-5, &mut broken);
     let sum = pairs().fold([0.0; 3], |sum, (v, m)| [0, 1, 2].map(|k| sum[k] + m * v[k]));
     let size: f64 = pairs().map(|(v, m)| m * norm(*v)).sum();
-    match loaded.case.effects.contact_mass {
-        None => margins.hold("momentum", norm(sum) / size, 1e-5, &mut broken),
-        Some(_) => margins.hold("momentum with added mass", norm(sum) / size, 0.2, &mut broken),
+    // inertia that comes and goes with contact carries momentum of its own
+    if loaded.case.effects.contact_mass.is_none() {
+        margins.hold("momentum", norm(sum) / size, 1e-5, &mut broken);
     }
 
     let mut looked = simulation(&loaded, mesh.clone(), Precision::F32).unwrap();
@@ -380,9 +384,10 @@ fn complaint(end: &End) -> Option<String> {
     }
 }
 
-/// Share of accepted cases that are quiet and right, in per cent. It should be 95. Two of the first twenty fabrics of seed 1 are
-/// stopped by the energy guard although a quarter of their step in f64 is quiet, and of a third the mirrored energy is off by 2.1 %.
-const HELD: u64 = 85;
+/// Share of accepted cases that are quiet and right, in per cent. It should be 95; of the first twenty fabrics of seeds 1 to 5 it is 92.
+/// Five are far from rest as they are generated, and the energy guard stops them in their first steps or where they are looked at
+/// more often; of two the mirrored energy is off by 2.1 and 2.6 %, of one the thermal work by 2.4 %.
+const HELD: u64 = 90;
 
 #[test]
 fn random_fabrics_run_quietly_and_hold_their_checks() {

@@ -93,8 +93,8 @@ fn add_virial(item: u32, push: vec3<f32>, apart: vec3<f32>) {
 @group(1) @binding(13) var<storage, read_write> stiffness: array<atomic<i32>>;
 @group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
 
-// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: a surface node that is
-// first seen deeper inside an open yarn came in through its end, and no side pushes it out.
+// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: what is first seen
+// deeper inside an open yarn came in through its end, and no side pushes it out.
 const ENTRY: f32 = 1e-3;
 // Bound on approach from which on the scene is looked at before it moves, mm/s.
 const AT_REST: f32 = 1e20;
@@ -226,15 +226,11 @@ fn penalty(item: u32) {
         let point = found.point;
         keys[k + 1u] = u32(found.place.ring);
         keys[k + 2u] = u32(found.place.slice);
-#if THREAD
-        all.enters = false;
-#else
         var open = true;
 #if PERIODIC
         open = !is_closed(candidate.body);
 #endif
         all.enters = open && states[s] <= 0.0 && row.approach < AT_REST;
-#endif
         all.push = vec3<f32>(0.0);
         all.normal_force = 0.0;
         all.touched = false;
@@ -255,13 +251,9 @@ fn penalty(item: u32) {
             states[s + 2u] = 0.0;
             states[s + 3u] = 0.0;
 #endif
-#if THREAD
-            states[s] = -max(point.distance - all.radius, 0.0);
-#else
             // a point behind a face keeps being looked at
-            let gap = select(0.0, point.distance - all.radius, height(point) > 0.0);
+            let gap = select(0.0, point.distance - all.radius, IS_THREAD || height(point) > 0.0);
             states[s] = select(-max(gap, 0.0), TOUCH, open && all.touched);
-#endif
             continue;
         }
         touches = true;

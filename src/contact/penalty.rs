@@ -53,8 +53,8 @@ const FORCE: usize = 12;
 const STIFFNESS: usize = 13;
 const STATUS: usize = 14;
 
-/// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: a surface node that is
-/// first seen deeper inside an open yarn came in through its end, and no side pushes it out. Bodies may overlap at the start.
+/// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: what is first seen deeper inside
+/// an open yarn came in through its end, and no side pushes it out. Bodies may overlap at the start.
 const ENTRY: f64 = 1e-3;
 /// Bound on approach from which on the scene is looked at before it moves, mm/s.
 pub const AT_REST: f64 = 1e20;
@@ -159,7 +159,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                 let from = Place { ring: at[1] as i32, slice: at[2] as i32 };
                 let (place, corners, point) = surface.walk(slave, body, image, from);
                 (at[1], at[2]) = (place.ring as u32, place.slice as u32);
-                let open = !THREAD && !surface.is_closed(body);
+                let open = !surface.is_closed(body);
                 let enters = open && state[0] <= zero && io.row.approach < constant(AT_REST);
                 let (near, single);
                 let faces = if THREAD && point.distance < radius {

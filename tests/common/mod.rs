@@ -160,6 +160,15 @@ pub fn shaped(
     json!({ "name": name, "elements": elements, "nodes": nodes, "density_t_mm3": density, "material": material })
 }
 
+/// Forces on all nodes at the start of the last step, N; zero where a node is held.
+pub fn forces(simulation: &Simulation) -> Vec<[f64; 3]> {
+    let b = &simulation.model.buffers;
+    let (acceleration, inverse) =
+        (simulation.backend().scalars(b.acceleration), simulation.backend().scalars(b.inverse_mass));
+    let force = |node: usize| [0, 1, 2].map(|k| acceleration[node + k * inverse.len()] / inverse[node]);
+    (0..inverse.len()).map(|node| if inverse[node] == 0.0 { [0.0; 3] } else { force(node) }).collect()
+}
+
 /// Current positions of all nodes, mm.
 pub fn positions(simulation: &Simulation) -> Vec<[f64; 3]> {
     let moved = simulation.fluctuations();
