@@ -44,15 +44,18 @@ impl Results<'_> {
         let width = specimen["width_mm"].as_f64().unwrap_or(f64::NAN);
         let (times, zones) = (table.texts("time_s"), table.texts("zone"));
         let [x, y, across] = ["slip_x_mm", "slip_y_mm", "reference_y_mm"].map(|name| table.numbers(name));
-        let mean = |zone: &str, edge: bool| {
+        let mean = |zone: &str, edge: bool| -> String {
             let own = (0..times.len()).filter(|&i| {
                 let at_edge = across[i].abs() > (0.5 - MARGIN) * width;
                 times[i] == times[times.len() - 1] && zones[i] == zone && at_edge == edge
             });
             let slips: Vec<f64> = own.map(|i| x[i].hypot(y[i])).filter(|slip| slip.is_finite()).collect();
-            slips.iter().sum::<f64>() / slips.len() as f64
+            match slips.len() {
+                0 => "none".into(),
+                count => format!("{:.3}", slips.iter().sum::<f64>() / count as f64),
+            }
         };
-        let each = ["A", "B", "C"].map(|zone| format!("{zone} {:.3} / {:.3}", mean(zone, true), mean(zone, false)));
+        let each = ["A", "B", "C"].map(|zone| format!("{zone} {} / {}", mean(zone, true), mean(zone, false)));
         let margin = MARGIN * width;
         Ok(Some(format!(
             "Slip of the plies within {margin:.0} mm of the free edges / farther inside, mm: {}",
