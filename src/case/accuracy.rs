@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Accuracy {
-    /// A first look: `resolution.finer` 0.6, `integration.dt_max_s` 7e-7.
+    /// A first look: `resolution.finer` 0.6.
     Preview,
     /// For results: `resolution.beams_per_lap` 110, everything else as by default.
     Engineering,
@@ -23,7 +23,7 @@ impl Accuracy {
     /// The fields of a case that the word stands for.
     pub fn fields(self) -> Value {
         match self {
-            Self::Preview => json!({ "resolution": { "finer": 0.6 }, "integration": { "dt_max_s": 7e-7 } }),
+            Self::Preview => json!({ "resolution": { "finer": 0.6 } }),
             Self::Engineering => json!({ "resolution": { "beams_per_lap": 110 } }),
             Self::Reference => json!({
                 "resolution": { "finer": 1.5, "beams_per_lap": 90 },
