@@ -40,8 +40,8 @@ const BURST: u64 = 8;
 const WINDOW: u64 = 64;
 /// Growth of the largest speed over a burst after which bursts start short again.
 const CALM: f64 = 1.4;
-/// Change of the speed of shear over a window, as a share of it, from which windows are as short as a burst: external work is the mean
-/// stress of a window times its strain, so both must not change together.
+/// Change of the speed of shear over a window, as a share of it, from which windows are as short as a burst: external work
+/// is the mean stress of a window times its strain, so both must not change together.
 const STEADY: f64 = 0.1;
 /// Energy below which rounding decides its balance, mJ.
 const NOISE: f64 = 1e-6;

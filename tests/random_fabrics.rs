@@ -384,9 +384,9 @@ fn complaint(end: &End) -> Option<String> {
     }
 }
 
-/// Share of accepted cases that are quiet and right, in per cent. It should be 95; of the first twenty fabrics of seeds 1 to 5 it is 92.
-/// Five are far from rest as they are generated, and the energy guard stops them in their first steps or where they are looked at
-/// more often; of two the mirrored energy is off by 2.1 and 2.6 %, of one the thermal work by 2.4 %.
+/// Share of accepted cases that are quiet and right, in per cent. It should be 95; of the first twenty fabrics of seeds 1
+/// to 5 it is 92. Five are far from rest as they are generated, and the energy guard stops them in their first steps or
+/// where they are looked at more often; of two the mirrored energy is off by 2.1 and 2.6 %, of one the thermal work by 2.4 %.
 const HELD: u64 = 90;
 
 #[test]

@@ -364,8 +364,8 @@ impl<R: Real> Closest<R> {
     /// point lies beside the border of a face it has passed under. The middle of a thread is never inside a body: if the
     /// border is closest, it is outside, whatever side of the face's plane it is on.
     ///
-    /// The direction is the gradient of the distance, so that contact has an energy: a node behind a fold is pushed to the fold, not along
-    /// the normal of either face, where it would rattle between the two and gain energy with every change.
+    /// The direction is the gradient of the distance, so that contact has an energy: a node behind a fold is pushed to the
+    /// fold, not along the normal of either face, where it would rattle between the two and gain energy with every change.
     #[inline(always)]
     pub fn normal_and_distance(&self, is_thread: bool) -> Option<(Vector<R>, R)> {
         let height = self.height();

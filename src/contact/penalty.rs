@@ -53,8 +53,8 @@ const FORCE: usize = 12;
 const STIFFNESS: usize = 13;
 const STATUS: usize = 14;
 
-/// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: what is first seen deeper inside
-/// an open yarn came in through its end, and no side pushes it out. Bodies may overlap at the start.
+/// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: what is first seen
+/// deeper inside an open yarn came in through its end, and no side pushes it out. Bodies may overlap at the start.
 const ENTRY: f64 = 1e-3;
 /// Bound on approach from which on the scene is looked at before it moves, mm/s.
 pub const AT_REST: f64 = 1e20;
