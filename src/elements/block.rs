@@ -7,8 +7,9 @@
 use super::LANES;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::difference;
+use crate::kernel::shader::{Shader, Share, when};
 use crate::kernel::stage::Io;
-use crate::materials::{PARAMETERS, Tensor};
+use crate::materials::{Material, PARAMETERS, Tensor};
 use bytemuck::{Pod, Zeroable};
 use std::marker::PhantomData;
 
@@ -23,6 +24,12 @@ pub const BOUND: usize = 8 * LANES;
 
 /// Binary corner index of each corner in mesh order.
 pub const BINARY: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
+
+/// The twin of a kernel of an element for a law, one lane an invocation.
+pub const fn shader<M: Material, const PERIODIC: bool>(file: &'static str, kernel: &'static str) -> Shader {
+    let defines = const { &[when(PERIODIC, "PERIODIC")] };
+    Shader { law: Some(M::SHADER), share: Share::Invocations(LANES), defines, ..Shader::new(file, kernel) }
+}
 
 /// What the kernels need to know of a block.
 #[repr(C)]

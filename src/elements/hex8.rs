@@ -5,9 +5,9 @@
 //! fibre's frame first; in periodic scenes the macroscopic gradient F̄ − I is added to H.
 
 use super::LANES;
-use super::block::{BINARY, Lanes, OUT, Params, cross, dot, total};
+use super::block::{BINARY, Lanes, OUT, Params, cross, dot, shader, total};
 use crate::kernel::lane::Lane;
-use crate::kernel::shader::{Shader, Share, when};
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use crate::materials::{Material, PARAMETERS, Tensor, jacobian};
 use std::marker::PhantomData;
@@ -129,12 +129,6 @@ fn corner_forces<L: Lane>(g: &[[L; 4]; 3]) -> [L; 8] {
         }
     }
     f
-}
-
-/// The twin of a kernel for a law, one lane an invocation.
-const fn shader<M: Material, const PERIODIC: bool>(kernel: &'static str) -> Shader {
-    let defines = const { &[when(PERIODIC, "PERIODIC")] };
-    Shader { law: Some(M::SHADER), share: Share::Invocations(LANES), defines, ..Shader::new("elements/hex8", kernel) }
 }
 
 /// Something to do at each Gauss point of one register of hexahedra.
@@ -302,7 +296,7 @@ impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
-    const SHADER: Shader = shader::<M, PERIODIC>("force");
+    const SHADER: Shader = shader::<M, PERIODIC>("elements/hex8", "force");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -339,7 +333,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
-    const SHADER: Shader = shader::<M, PERIODIC>("energy");
+    const SHADER: Shader = shader::<M, PERIODIC>("elements/hex8", "energy");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -366,7 +360,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Bound<M, PERIODIC> {
-    const SHADER: Shader = shader::<M, PERIODIC>("bound");
+    const SHADER: Shader = shader::<M, PERIODIC>("elements/hex8", "bound");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

@@ -14,9 +14,9 @@
 //! and leaves W. The modes bend fibres within an element: there the fibres' own stiffness has no part.
 
 use super::LANES;
-use super::block::{BINARY, Lanes, OUT, Params, dot, total};
+use super::block::{BINARY, Lanes, OUT, Params, dot, shader, total};
 use crate::kernel::lane::Lane;
-use crate::kernel::shader::{Shader, Share, when};
+use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use crate::materials::{Material, Tensor, jacobian};
 use std::marker::PhantomData;
@@ -150,14 +150,8 @@ fn deformation<L: Lane, const PERIODIC: bool>(io: &Io<L::Scalar>, lanes: &Lanes<
     Deformation { h, modes }
 }
 
-/// The twin of a kernel for a law, one lane an invocation.
-const fn shader<M: Material, const PERIODIC: bool>(kernel: &'static str) -> Shader {
-    let (defines, share) = (const { &[when(PERIODIC, "PERIODIC")] }, Share::Invocations(LANES));
-    Shader { law: Some(M::SHADER), share, defines, ..Shader::new("elements/hex8_reduced", kernel) }
-}
-
 impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
-    const SHADER: Shader = shader::<M, PERIODIC>("force");
+    const SHADER: Shader = shader::<M, PERIODIC>("elements/hex8_reduced", "force");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -210,7 +204,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
-    const SHADER: Shader = shader::<M, PERIODIC>("energy");
+    const SHADER: Shader = shader::<M, PERIODIC>("elements/hex8_reduced", "energy");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -245,7 +239,7 @@ fn add_rows<L: Lane>(rows: &mut [L; 8], k_total: L, sizes: &[L; 8]) {
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Bound<M, PERIODIC> {
-    const SHADER: Shader = shader::<M, PERIODIC>("bound");
+    const SHADER: Shader = shader::<M, PERIODIC>("elements/hex8_reduced", "bound");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
