@@ -119,7 +119,7 @@ pub struct Stitch {
     #[serde(default = "linear_density")]
     #[schemars(range(min = 0.01, max = 1e5))]
     pub linear_density_tex: f64,
-    /// Thermal strain that tightens the stitch, additive (Eq. 14). Paper: −0.15.
+    /// Thermal strain that tightens the stitch, additive (Eq. 14), of the length along its path. 0 leaves it as generated. Paper: −0.15.
     #[schemars(range(min = -0.9, max = 0.5))]
     pub thermal_strain: f64,
     /// Share of the generated curvature that is stress-free: 1 threads rest as generated (as in Abaqus), 0 straight. Default 1.

@@ -116,10 +116,13 @@ fn add_threads(
     wefts: usize,
 ) -> Result<()> {
     let path = layout.path()?;
-    let lap: Vec<([f64; 3], Part)> = path
+    let lap: Vec<([f64; 3], (Part, f64))> = path
         .beams(beams, fabric.stitch.radius_mm)
         .into_iter()
-        .map(|(arcs, part)| (path.line.at(arcs[0]).map(quantised), part))
+        .map(|([from, to], part)| {
+            let [a, b] = [from, to].map(|arc| path.line.at(arc).map(quantised));
+            (a, (part, stitch::excess(to - from, a, b)))
+        })
         .collect();
     for i in 0..warps {
         let first = mesh.nodes.len();
@@ -129,8 +132,8 @@ fn add_threads(
             let side = if j % 2 == 0 { 1.0 } else { -1.0 };
             mesh.nodes.extend(lap.iter().map(|(p, _)| [x + side * p[0], y + p[1], p[2]]));
         }
-        let parts = (0..wefts).flat_map(|_| lap.iter().map(|(_, part)| *part)).collect();
-        mesh.threads.push(stitch::thread(&fabric.stitch, format!("thread {}", i + 1), first, Some([0, 1]), parts));
+        let beams = (0..wefts).flat_map(|_| lap.iter().map(|(_, beam)| *beam)).collect();
+        mesh.threads.push(stitch::thread(&fabric.stitch, format!("thread {}", i + 1), first, Some([0, 1]), beams));
     }
     Ok(())
 }

@@ -112,6 +112,7 @@ fn add_thread(mesh: &mut Mesh, thread: &InlineThread, place: &str) -> Result<()>
         thermal_strain: thread.thermal_strain,
         velocity: thread.velocity_mm_s,
         parts: vec![Part::Free; count - 1],
+        excess: vec![0.0; count - 1],
     });
     Ok(())
 }

@@ -16,7 +16,7 @@ use crate::case::Case;
 use crate::case::domain::{Resolution, Specimen};
 use crate::case::fabric::{Fabric, Yarn};
 use crate::error::{Error, Result};
-use crate::mesh::vector::{Vector, norm, sub};
+use crate::mesh::vector::Vector;
 use crate::mesh::{Block, Mesh, Part, Ply, quality};
 
 /// Fewest columns of a yarn that is cut along its length, and fewest slices.
@@ -239,24 +239,36 @@ fn add_threads(mesh: &mut Mesh, cut: &Cut, layout: &Layout, fabric: &Fabric, bea
         };
         let beams = (-courses..=courses).flat_map(|j| lap.iter().map(move |&(arcs, part)| (j, arcs, part)));
         let mut pieces = pieces(cut, beams.map(|(j, arcs, part)| (move |arc| at(j, arc), arcs, part)));
-        let length = |piece: &Piece| -> f64 { piece.nodes.windows(2).map(|p| norm(sub(p[1], p[0]))).sum() };
-        pieces.retain(|piece| piece.nodes.len() > 1 && length(piece) >= path.loop_length);
+        pieces.retain(|piece| piece.length() >= path.loop_length);
         number += usize::from(!pieces.is_empty());
         for (k, piece) in pieces.into_iter().enumerate() {
             let first = mesh.nodes.len();
-            mesh.nodes.extend(piece.nodes.iter().map(|p| p.map(quantised)));
+            mesh.nodes.extend(piece.nodes.iter().map(|(p, _)| p.map(quantised)));
             let name = format!("thread {number}.{}", k + 1);
-            mesh.threads.push(stitch::thread(&fabric.stitch, name, first, None, piece.parts));
+            mesh.threads.push(stitch::thread(&fabric.stitch, name, first, None, piece.beams()));
         }
     }
     Ok(())
 }
 
-/// A piece of thread: nodes, and the part of the lap of the beam between each and the next.
+/// A piece of thread: nodes with their arc lengths, and the part of the lap of the beam between each and the next.
 #[derive(Default)]
 struct Piece {
-    nodes: Vec<Vector>,
+    nodes: Vec<(Vector, f64)>,
     parts: Vec<Part>,
+}
+
+impl Piece {
+    /// Arc length from its first node to its last, mm.
+    fn length(&self) -> f64 {
+        self.nodes.last().map_or(0.0, |(_, end)| end - self.nodes[0].1)
+    }
+
+    /// Part and excess of each beam.
+    fn beams(&self) -> Vec<(Part, f64)> {
+        let excess = self.nodes.windows(2).map(|ends| stitch::excess(ends[1].1 - ends[0].1, ends[0].0, ends[1].0));
+        self.parts.iter().copied().zip(excess).collect()
+    }
 }
 
 /// Cuts a chain of beams, each with its curve and arc lengths on it, where it leaves the rectangle. A beam that would be
@@ -264,17 +276,19 @@ struct Piece {
 fn pieces<C: Fn(f64) -> Vector>(cut: &Cut, beams: impl Iterator<Item = (C, [f64; 2], Part)>) -> Vec<Piece> {
     let mut pieces = Vec::new();
     let mut piece = Piece::default();
+    let mut before = 0.0;
     for (curve, [from, to], part) in beams {
+        let node = |arc: f64| (curve(arc), before + arc - from);
         let inside = [from, to].map(|arc| cut.holds(curve(arc)));
         match (inside[0], piece.nodes.is_empty()) {
-            (true, true) => piece.nodes.push(curve(from)),
+            (true, true) => piece.nodes.push(node(from)),
             // the end of the beam before lay on the very border
             (false, false) => pieces.push(std::mem::take(&mut piece)),
             _ => {}
         }
         match inside {
             [true, true] => {
-                piece.nodes.push(curve(to));
+                piece.nodes.push(node(to));
                 piece.parts.push(part);
             }
             [true, false] => {
@@ -284,19 +298,20 @@ fn pieces<C: Fn(f64) -> Vector>(cut: &Cut, beams: impl Iterator<Item = (C, [f64;
                 } else {
                     piece.parts.push(part);
                 }
-                piece.nodes.push(curve(border));
+                piece.nodes.push(node(border));
                 pieces.push(std::mem::take(&mut piece));
             }
             [false, true] => {
                 let border = leaves(cut, &curve, to, from);
-                piece.nodes.push(curve(border));
+                piece.nodes.push(node(border));
                 if to - border >= 0.5 * (to - from) {
-                    piece.nodes.push(curve(to));
+                    piece.nodes.push(node(to));
                     piece.parts.push(part);
                 }
             }
             [false, false] => {}
         }
+        before += to - from;
     }
     pieces
 }

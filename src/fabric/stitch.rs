@@ -5,7 +5,7 @@ use super::polyline::Polyline;
 use super::section::{Section, smooth};
 use crate::case::fabric::{Fabric, Lap, Stitch, Yarn};
 use crate::error::{Error, Result};
-use crate::mesh::vector::{Vector, between};
+use crate::mesh::vector::{Vector, between, norm, sub};
 use crate::mesh::{Part, Thread, quality};
 use libm::{cos, sin};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -244,9 +244,15 @@ impl Path {
     }
 }
 
-/// A thread of the stitch whose nodes start at `first`, with the part of the lap that each beam belongs to; a closed chain
-/// if it has a `wrap`.
-pub fn thread(stitch: &Stitch, name: String, first: usize, wrap: Option<[i32; 2]>, parts: Vec<Part>) -> Thread {
+/// Length of a curve between two of its points over their distance, less 1.
+pub fn excess(arc: f64, from: Vector, to: Vector) -> f64 {
+    arc / norm(sub(to, from)) - 1.0
+}
+
+/// A thread of the stitch whose nodes start at `first`, with the part of the lap that each beam belongs to and its
+/// [`excess`]; a closed chain if it has a `wrap`.
+pub fn thread(stitch: &Stitch, name: String, first: usize, wrap: Option<[i32; 2]>, beams: Vec<(Part, f64)>) -> Thread {
+    let (parts, excess): (Vec<Part>, Vec<f64>) = beams.into_iter().unzip();
     Thread {
         name,
         first,
@@ -260,5 +266,6 @@ pub fn thread(stitch: &Stitch, name: String, first: usize, wrap: Option<[i32; 2]
         thermal_strain: stitch.thermal_strain,
         velocity: [0.0; 3],
         parts,
+        excess,
     }
 }

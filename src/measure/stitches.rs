@@ -168,6 +168,7 @@ mod tests {
                 thermal_strain: 0.0,
                 velocity: [0.0; 3],
                 parts: vec![Part::Loop, Part::Loop, Part::Underlap, Part::Underlap],
+                excess: vec![0.0; 4],
             }],
             ..Mesh::default()
         }

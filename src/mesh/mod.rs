@@ -97,6 +97,8 @@ pub struct Thread {
     pub velocity: [f64; 3],
     /// Which part of the lap each beam belongs to (`beam i` joins nodes i and i + 1).
     pub parts: Vec<Part>,
+    /// Length of the curve that each beam is a chord of, over the length of the chord, less 1.
+    pub excess: Vec<f64>,
 }
 
 /// Part of a lap.

@@ -53,12 +53,12 @@ fn elements<'a>(mesh: &'a Mesh, block: &'a Block) -> impl Iterator<Item = [Vecto
     })
 }
 
-/// Length of a thread in mm, over the beams of the given part or over all.
+/// Length of a thread along its curve in mm, over the beams of the given part or over all.
 pub fn length(mesh: &Mesh, thread: &Thread, part: Option<Part>) -> f64 {
     (0..thread.beams())
         .filter(|&i| part.is_none_or(|p| thread.parts[i] == p))
-        .map(|i| thread.beam(i).map(|n| mesh.position(n)))
-        .map(|[a, b]| norm(sub(b, a)))
+        .map(|i| (thread.beam(i).map(|n| mesh.position(n)), thread.excess[i]))
+        .map(|([a, b], excess)| norm(sub(b, a)) * (1.0 + excess))
         .sum()
 }
 

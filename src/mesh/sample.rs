@@ -36,6 +36,7 @@ pub fn plies() -> Mesh {
         thermal_strain: -0.15,
         velocity: [0.0; 3],
         parts: (0..count).map(|i| if i % 60 < 30 { Part::Loop } else { Part::Underlap }).collect(),
+        excess: vec![0.0; count],
     });
     mesh
 }
