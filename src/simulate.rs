@@ -54,7 +54,7 @@ const SPEED_MARGIN: f64 = 2.0;
 /// Farthest that nodes may travel in a burst, mm, so that the range of positions is left by less than what wraps around.
 const FARTHEST: f64 = 3.0;
 /// Step that a run starts with, as a share of the limit: legs that start crushed need it while they relax.
-const FIRST_SHARE: f64 = 0.4;
+const FIRST_SHARE: f64 = 0.15;
 /// Time over which the first share grows to one, s.
 const FIRST_TIME: f64 = 2e-4;
 
@@ -327,11 +327,16 @@ impl Simulation {
         self.hold();
         let mut rows = Vec::with_capacity(steps as usize);
         let mut time = self.time;
-        for _ in 0..steps {
+        let looked_at = self.diagnosed == self.step;
+        for step in 0..steps {
             let row = self.schedule.row(time, self.dt, self.dt_before);
+            // thermal work by the trapezoidal rule; across a look, the tension after it stands for both
+            let (back, ahead) = (row.thermal_increment, self.schedule.load(time + self.dt).thermal - row.thermal);
+            let first = if step == 0 && looked_at { back } else { 0.5 * back };
+            let second = if step + 1 == steps && looks { 0.0 } else { 0.5 * ahead };
             let affine = largest(row.rate);
             let approach = 2.0 * SPEED_MARGIN * self.speed + 2.0 * affine * AFFINE_REACH;
-            rows.push(Row { approach, ..row });
+            rows.push(Row { approach, thermal_increment: first + second, ..row });
             self.dt_before = self.dt;
             time += self.dt;
         }

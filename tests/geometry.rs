@@ -117,6 +117,24 @@ fn sixty_graded_beams_a_lap_stay_clear() {
     assert!((length - 106.3).abs() < 0.5, "{length}");
 }
 
+/// However few beams stand for it, a thread is as long as its path.
+#[test]
+fn a_thread_is_as_long_as_its_path() {
+    let lengths = [60, 90, 1200].map(|beams| {
+        let mesh = made(smooth_yarns(beams), fabric(0.05, 0.015)).unwrap();
+        let thread = &mesh.threads[0];
+        let chords = (0..thread.beams()).map(|i| thread.beam(i).map(|n| mesh.position(n)));
+        let chords: f64 = chords.map(|[a, b]| norm(sub(b, a))).sum();
+        (quality::length(&mesh, thread, None), chords)
+    });
+    println!("along the path and along the beams: {lengths:.5?}");
+    let (path, chords) = lengths[2];
+    assert!((path / chords - 1.0).abs() < 2e-5);
+    for (length, chords) in &lengths[..2] {
+        assert!((length / path - 1.0).abs() < 1e-6 && *chords < 0.9995 * path, "{length} {chords} {path}");
+    }
+}
+
 #[test]
 fn beams_are_tagged_as_loop_or_underlap() {
     let mesh = default_mesh();

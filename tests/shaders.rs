@@ -105,13 +105,14 @@ fn parameters(file: &str) -> Vec<Field<&'static str>> {
         ),
         "conditions/prescribed" => fields!(conditions::prescribed::Params: first_thread, gravity),
         "dynamics/assemble" => fields!(
-            dynamics::assemble::Params: first_thread, force_quantum, stiffness_quantum, mass_factor, mass_memory
+            dynamics::assemble::Params: first_thread, force_quantum, stiffness_quantum, mass_factor, mass_memory,
+            mass_per_stiffness
         ),
         "dynamics/fibre_lines" => fields!(dynamics::fibre_lines::Params: beta),
         "dynamics/integrate" => fields!(dynamics::integrate::Params: first_thread, gravity),
         "dynamics/energy" => fields!(dynamics::energy::Params: count, length, into, centre),
         "dynamics/totals" => fields!(dynamics::totals::Params: start, count, lanes, stride, columns, length, into),
-        "dynamics/time_step" => fields!(dynamics::time_step::Params: first_thread),
+        "dynamics/time_step" => fields!(dynamics::time_step::Params: first_thread, mass_per_stiffness),
         _ => Vec::new(),
     }
 }

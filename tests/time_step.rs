@@ -127,6 +127,28 @@ fn the_estimate_holds_for_a_cell_with_contact_and_stick() {
     check("cell sheared", &mut cell, 0.4);
 }
 
+/// Nodes whose elements would call for shorter steps are made heavier, and no heavier than that takes.
+#[test]
+fn a_least_limit_holds_for_elements() {
+    let mut case = coarse_cell();
+    let mut before = start(&case, F64);
+    advance(&mut before, 1.5e-4);
+    for factor in [0.5, 3.0] {
+        let least = factor * before.health().dt_limit;
+        case["effects"] = json!({ "contact_mass": { "least_limit_s": least } });
+        let mut cell = start(&case, F64);
+        advance(&mut cell, 1.5e-4);
+        let now = cell.health();
+        println!("limit {:.3e} s, at least {least:.3e} s; {:.2?} of mass added", now.dt_limit, now.added_mass);
+        if factor < 1.0 {
+            assert_eq!(cell.state_hash(), before.state_hash());
+        } else {
+            near("limit", now.dt_limit, least, 1e-6);
+            check("cell with a least limit", &mut cell, 0.4);
+        }
+    }
+}
+
 /// A step above the measured limit fails within 2,000 steps, one below it lasts.
 #[test]
 fn steps_confirm_the_limit() {

@@ -29,6 +29,7 @@ struct Params {
     stiffness_quantum: f32,
     mass_factor: f32,
     mass_memory: f32,
+    mass_per_stiffness: f32,
 }
 
 @group(2) @binding(1) var<uniform> params: Params;
@@ -129,7 +130,8 @@ fn assemble(node: u32) {
     contact_stiffness[node] = 0;
 #if MASS_ADDED
     let reach = params.mass_factor * 0.25 * row.dt * row.dt;
-    let needed = select(0.0, (contact + element_stiffness[node]) * reach - acting, contact > 0.0);
+    let touching = select(0.0, (contact + element_stiffness[node]) * reach, contact > 0.0);
+    let needed = max(touching, element_stiffness[node] * params.mass_per_stiffness) - acting;
     let added = max(needed, added_mass[node] * params.mass_memory);
     added_mass[node] = added;
     acting = acting + added;

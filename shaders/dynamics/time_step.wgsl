@@ -6,6 +6,7 @@
 #if element_limit
 struct Params {
     first_thread: u32,
+    mass_per_stiffness: f32,
 }
 
 @group(2) @binding(1) var<uniform> params: Params;
@@ -81,7 +82,7 @@ fn element_limit(node: u32) {
 #endif
     }
     limit[node] = k;
-    limit[node + arrayLength(&mass)] = k / mass[node];
+    limit[node + arrayLength(&mass)] = k / max(mass[node], k * params.mass_per_stiffness);
 }
 #endif
 

@@ -148,10 +148,13 @@ pub struct ContactMass {
     /// Share of the added mass that remains after each step once contact is lost, 0 to 1: mass that comes and goes with contact gains energy. Default 0.999.
     #[schemars(range(min = 0, max = 1))]
     pub memory: f64,
+    /// Least limit of the time step, s: nodes whose elements alone would call for a shorter one are made heavier, in contact or not. Default 0: none.
+    #[schemars(range(min = 0, max = 1e-3))]
+    pub least_limit_s: f64,
 }
 
 impl Default for ContactMass {
     fn default() -> Self {
-        Self { factor: 2.0, memory: 0.999 }
+        Self { factor: 2.0, memory: 0.999, least_limit_s: 0.0 }
     }
 }

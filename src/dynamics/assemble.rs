@@ -1,8 +1,9 @@
 //! Accelerations: each node gathers its corner slots in a fixed order, adds contact, and divides by its mass.
 //!
 //! With contact-aware mass, a node in contact is as heavy as a stable step needs, m ≥ dt²/4 · K, with K the row sum of the
-//! stiffness of contact and of elements at the node; what was added fades once contact is lost. Without it, the largest
-//! K/m of contact is reported for the choice of the time step.
+//! stiffness of contact and of elements at the node; what was added fades once contact is lost. A least limit of the step does the
+//! same for elements alone: a few slivers at cut edges need not hold up a scene. Without contact-aware mass, the largest K/m of
+//! contact is reported for the choice of the time step.
 
 use crate::contact::status::CONTACT_RATE;
 use crate::elements::LANES;
@@ -35,6 +36,8 @@ pub struct Params {
     pub mass_factor: f32,
     /// Share of added mass kept per step.
     pub mass_memory: f32,
+    /// Least mass for the stiffness of elements, s²: a quarter of the square of the least limit of the time step.
+    pub mass_per_stiffness: f32,
 }
 
 pub const SOLID_SLOTS: usize = 0;
@@ -89,6 +92,7 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool> Kernel
         let zero = L::Scalar::from_f64(0.0);
         let real = |x: f32| L::Scalar::from_f64(f64::from(x));
         let reach = real(params.mass_factor * 0.25) * io.row.dt * io.row.dt;
+        let least = real(params.mass_per_stiffness);
         for node in items {
             let mut force = [zero; 3];
             if node < first_thread {
@@ -133,7 +137,8 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool> Kernel
                 let contact = L::Scalar::from_i32(*quanta) * real(params.stiffness_quantum);
                 *quanta = 0;
                 if let Some(added) = &mut added {
-                    let needed = if contact > zero { (contact + elements[node]) * reach - mass } else { zero };
+                    let touching = if contact > zero { (contact + elements[node]) * reach } else { zero };
+                    let needed = touching.max(elements[node] * least) - mass;
                     let added = added.at(0, node);
                     *added = needed.max(*added * real(params.mass_memory));
                     mass = mass + *added;

@@ -31,6 +31,8 @@ use crate::elements::bend::BEND;
 pub struct Params {
     /// First node of a thread.
     pub first_thread: u32,
+    /// See [`super::assemble::Params`]: mass that is added for the stiffness of elements counts.
+    pub mass_per_stiffness: f32,
 }
 
 /// For each solid node, where its corner bounds are.
@@ -98,7 +100,8 @@ impl<const BENDING: bool> Kernel for ElementLimit<BENDING> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { first_thread } = io.params();
+        let Params { first_thread, mass_per_stiffness } = io.params();
+        let least = L::Scalar::from_f64(f64::from(mass_per_stiffness));
         let (slots, bounds) = (io.uints(SOLID_BOUNDS), io.scalars(HEX_BOUND));
         let (constant, masses) = (io.scalars(CONSTANT), io.scalars(MASS));
         let (thread, forces, beams) = (io.uints(THREAD_SLOTS), io.scalars(BEAM_FORCE), io.scalars(BEAMS));
@@ -137,7 +140,7 @@ impl<const BENDING: bool> Kernel for ElementLimit<BENDING> {
                 }
             }
             *limits.at(0, node) = k;
-            *limits.at(1, node) = k / masses[node];
+            *limits.at(1, node) = k / masses[node].max(k * least);
         }
     }
 }

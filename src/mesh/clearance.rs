@@ -1,6 +1,5 @@
 //! Room between threads and their neighbours in the reference position.
 
-use super::quality::length;
 use super::vector::{Vector, add, between, dot, norm, scale, sub};
 use super::{Block, Mesh, Ply};
 
@@ -134,9 +133,10 @@ struct Segment {
 /// Smallest gap between two threads, or between two beams of one thread whose nearest ends are further than `arc` apart
 /// along it.
 pub fn thread_thread(mesh: &Mesh, arc: f64) -> Option<Clearance> {
-    let lengths: Vec<f64> = mesh.threads.iter().map(|t| length(mesh, t, None)).collect();
     let thickest = mesh.threads.iter().map(|t| t.radius).fold(0.0, f64::max);
     let originals = segments(mesh);
+    let mut lengths = vec![0.0; mesh.threads.len()];
+    originals.iter().for_each(|s| lengths[s.thread] += s.length);
     let images = images(mesh, &originals);
     let low = |s: &Segment| s.ends[0][0].min(s.ends[1][0]);
     let widest = originals.iter().map(|s| (s.ends[1][0] - s.ends[0][0]).abs()).fold(0.0, f64::max);

@@ -50,7 +50,8 @@ impl Active {
             }),
             periodic: mesh.period.is_some(),
             fibre_lines: !lines.is_empty(),
-            contact_mass: (touches || ties) && effects.contact_mass.as_ref().is_some_and(|mass| mass.factor > 0.0),
+            contact_mass: (touches || ties)
+                && effects.contact_mass.as_ref().is_some_and(|mass| mass.factor > 0.0 || mass.least_limit_s > 0.0),
             ties,
         }
     }

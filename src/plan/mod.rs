@@ -343,6 +343,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         stiffness_quantum: contact.as_ref().map_or(1.0, |c| c.params.stiffness_quantum),
         mass_factor: contact_mass.map_or(0.0, |c| c.factor as f32),
         mass_memory: contact_mass.map_or(0.0, |c| c.memory as f32),
+        mass_per_stiffness: contact_mass.map_or(0.0, |c| (0.25 * c.least_limit_s * c.least_limit_s) as f32),
     };
     let mut reads = vec![solid_slots, hex.force, thread_slots, beam_force, mass];
     reads.extend(bent.iter().flat_map(|bent| [bent.slots, bent.force]));
@@ -422,7 +423,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         let rows = b.table("bend rows", threads.bend_rows.clone());
         reads.extend([bent.slots, bent.table, bent.energy, bent.force, rows]);
     }
-    let params = time_step::Params { first_thread };
+    let params = time_step::Params { first_thread, mass_per_stiffness: assemble_params.mass_per_stiffness };
     let writes = [(element_limit, own(2, 1))];
     let kernel = flagged!(ElementLimit; active.bending);
     b.plan.diagnose.push(waiting(coded(kernel, "element limit", nodes, NODE_GRAIN, &reads, &writes, params)));
