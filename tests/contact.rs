@@ -319,16 +319,22 @@ fn a_face_pushes_along_the_gradient_of_the_distance() {
 fn what_enters_through_an_open_end_is_not_pushed_out() {
     let yarn = block("yarn", [8, 2, 1], [[0.0, 0.0, 0.0], [2.0, 1.0, 0.4]], 1e-9, neo_hookean(10.0, 0.3));
     let slider = block("slider", [4, 2, 1], [[-1.2, 0.2, 0.32], [-0.2, 0.8, 0.72]], 1e-9, neo_hookean(10.0, 0.3));
-    let thread = json!({ "name": "slider", "nodes": [[-1.2, 0.5, 0.2], [-0.7, 0.5, 0.2], [-0.2, 0.5, 0.2]],
-                         "radius_mm": 0.05, "axial_n": 1, "linear_density_tex": 10 });
+    let thread = |z: f64| {
+        json!({ "name": "slider", "nodes": [[-1.2, 0.3, z], [-0.7, 0.3, z], [-0.2, 0.3, z]],
+                "radius_mm": 0.05, "axial_n": 1, "linear_density_tex": 10 })
+    };
+    // the higher thread touches the rim as it passes
+    let [deep, high] = [thread(0.2), thread(0.37)];
     let whole =
         |body: &str, x: f64| json!({ "within": [[-9, -9, -9], [9, 9, 9]], "body": body, "displacement_mm": [x, 0, 0] });
-    for (blocks, threads) in [(json!([yarn, slider]), json!([])), (json!([yarn]), json!([thread]))] {
+    for (blocks, threads) in
+        [(json!([yarn, slider]), json!([])), (json!([yarn]), json!([deep])), (json!([yarn]), json!([high]))]
+    {
         let case = with(
             scene(blocks, json!({})),
             &[
                 ("/domain/mesh/threads", threads),
-                ("/domain/mesh/conditions", json!([whole("yarn", 0.0), whole("slider", 0.7)])),
+                ("/domain/mesh/conditions", json!([whole("yarn", 0.0), whole("slider", 0.75)])),
                 ("/steps", json!([{ "move": { "time_s": 2e-4 } }])),
                 ("/integration", json!({ "dt_max_s": 2e-7 })),
             ],

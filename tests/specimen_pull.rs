@@ -15,7 +15,7 @@ const PULL: f64 = 1.2;
 /// The small specimen of the cases, smaller still.
 fn loaded(sets: &[&str]) -> Loaded {
     let steps = json!([
-        { "pretension": { "time_s": 3e-3 } }, { "hold": { "time_s": 0.5e-3 } }, { "move": { "time_s": 2.5e-3 } }
+        { "pretension": { "time_s": 3e-3 } }, { "hold": { "time_s": 0.5e-3 } }, { "move": { "time_s": 3.2e-3 } }
     ]);
     let ours = ["domain.specimen.length_mm=20", "domain.specimen.width_mm=14"].map(String::from);
     let ours = ours.into_iter().chain([format!("domain.specimen.displacement_mm={PULL}"), format!("steps={steps}")]);

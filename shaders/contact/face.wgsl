@@ -137,6 +137,17 @@ fn has_slice(body: u32, slice: i32) -> bool {
 #endif
     return slice >= 0 && slice < slices_of(body);
 }
+
+// Whether a face is in the first or last slice of an open body.
+fn is_end(body: u32, place: Place) -> bool {
+    return !(has_slice(body, place.slice - 1) && has_slice(body, place.slice + 1));
+}
+
+// Whether the point closest to a slave is on the rim of an open end.
+fn is_rim(body: u32, place: Place, point: Closest) -> bool {
+    let ahead = point.xi >= 1.0 && !has_slice(body, place.slice + 1);
+    return ahead || (point.xi <= -1.0 && !has_slice(body, place.slice - 1));
+}
 #endif
 
 // Middle and derivatives of a bilinear patch.

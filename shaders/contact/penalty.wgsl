@@ -100,6 +100,8 @@ const ENTRY: f32 = 1e-3;
 const AT_REST: f32 = 1e20;
 // Force that stands for a touch without pressure, N.
 const TOUCH: f32 = 1e-30;
+// And the one that stands for a thread inside an open yarn, N.
+const INSIDE: f32 = 4e-30;
 
 // Whether slaves are nodes of threads.
 #if THREAD
@@ -230,15 +232,32 @@ fn penalty(item: u32) {
 #if PERIODIC
         open = !is_closed(candidate.body);
 #endif
-        all.enters = open && states[s] <= 0.0 && row.approach < AT_REST;
+        let moves = row.approach < AT_REST;
+#if THREAD
+        var inside = false;
+        if open && moves {
+            let was = states[s] == INSIDE;
+            let comes = point.interior && (states[s] <= 0.0 || is_end(candidate.body, found.place));
+            let stays = was && !is_rim(candidate.body, found.place, point);
+            inside = height(point) < 0.0 && (comes || stays);
+            if was && !inside {
+                states[s] = 0.0;
+            }
+        }
+#endif
+        all.enters = open && moves && states[s] <= 0.0;
         all.push = vec3<f32>(0.0);
         all.normal_force = 0.0;
         all.touched = false;
-        touch(&all, found.corners, point);
 #if THREAD
-        if point.distance < all.radius {
-            faces_within(&all, slave, candidate.body, candidate.image, found, all.radius);
+        if !inside {
+            touch(&all, found.corners, point);
+            if point.distance < all.radius {
+                faces_within(&all, slave, candidate.body, candidate.image, found, all.radius);
+            }
         }
+#else
+        touch(&all, found.corners, point);
 #endif
         let size = norm(all.push);
 #if FRICTION
@@ -253,7 +272,14 @@ fn penalty(item: u32) {
 #endif
             // a point behind a face keeps being looked at
             let gap = select(0.0, point.distance - all.radius, IS_THREAD || height(point) > 0.0);
+            let before = max(states[s], 0.0);
             states[s] = select(-max(gap, 0.0), TOUCH, open && all.touched);
+#if THREAD
+            if inside {
+                add_sum(item, SUM_DAMPING, 0.5 * before * before / all.stiff);
+                states[s] = INSIDE;
+            }
+#endif
             continue;
         }
         touches = true;

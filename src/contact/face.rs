@@ -67,7 +67,7 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
 
     /// Whether a slice of faces is on a body.
     #[inline(always)]
-    pub fn has_slice(&self, body: usize, slice: i32) -> bool {
+    fn has_slice(&self, body: usize, slice: i32) -> bool {
         self.is_closed(body) || (0..self.bodies[body].slices as i32).contains(&slice)
     }
 
@@ -75,6 +75,20 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
     #[inline(always)]
     pub fn is_closed(&self, body: usize) -> bool {
         PERIODIC && self.bodies[body].closed == 1
+    }
+
+    /// Whether a face is in the first or last slice of an open body.
+    #[inline(always)]
+    pub fn is_end(&self, body: usize, place: Place) -> bool {
+        !(self.has_slice(body, place.slice - 1) && self.has_slice(body, place.slice + 1))
+    }
+
+    /// Whether the point closest to a slave is on the rim of an open end.
+    #[inline(always)]
+    pub fn is_rim(&self, body: usize, place: Place, point: &Closest<R>) -> bool {
+        let one = R::from_f64(1.0);
+        let ahead = point.xi >= one && !self.has_slice(body, place.slice + 1);
+        ahead || point.xi <= -one && !self.has_slice(body, place.slice - 1)
     }
 
     /// Reference and current position of a surface node relative to the slave node.

@@ -54,12 +54,18 @@ const STIFFNESS: usize = 13;
 const STATUS: usize = 14;
 
 /// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: what is first seen
-/// deeper inside an open yarn came in through its end, and no side pushes it out. Bodies may overlap at the start.
+/// deeper inside an open yarn came in through its end, and no side pushes it out. Nor does one push a thread that touched the
+/// rim of the end before: its middle is inside as soon as it has passed the rim, and the energy of the touch is lost. A thread that
+/// came in stays [`INSIDE`] until its middle is out again. Bodies may overlap at the start.
 const ENTRY: f64 = 1e-3;
 /// Bound on approach from which on the scene is looked at before it moves, mm/s.
 pub const AT_REST: f64 = 1e20;
 /// Force that stands for a touch without pressure, N.
 const TOUCH: f64 = 1e-30;
+/// And the one that stands for a thread inside an open yarn, N.
+const INSIDE: f64 = 4e-30;
+/// What is smaller is such a mark and no force, N.
+pub const LEAST_FORCE: f64 = 1e-29;
 
 /// Contact forces of the nodes of threads (`THREAD`) or of yarn surfaces on yarns.
 pub struct Penalty<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool>;
@@ -160,9 +166,22 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                 let (place, corners, point) = surface.walk(slave, body, image, from);
                 (at[1], at[2]) = (place.ring as u32, place.slice as u32);
                 let open = !surface.is_closed(body);
-                let enters = open && state[0] <= zero && io.row.approach < constant(AT_REST);
+                let moves = io.row.approach < constant(AT_REST);
+                let mut inside = false;
+                if THREAD && open && moves {
+                    let was = state[0] == constant(INSIDE);
+                    let comes = point.interior && (state[0] <= zero || surface.is_end(body, place));
+                    let stays = was && !surface.is_rim(body, place, &point);
+                    inside = point.height() < zero && (comes || stays);
+                    if was && !inside {
+                        state[0] = zero;
+                    }
+                }
+                let enters = open && moves && state[0] <= zero;
                 let (near, single);
-                let faces = if THREAD && point.distance < radius {
+                let faces = if inside {
+                    &[][..]
+                } else if THREAD && point.distance < radius {
                     near = surface.faces_within(slave, body, image, place, (corners, point), radius);
                     &near.faces[..near.count]
                 } else {
@@ -224,7 +243,12 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                     }
                     // a point behind a face keeps being looked at
                     let gap = if THREAD || point.height() > zero { point.distance - radius } else { zero };
+                    let before = state[0].max(zero);
                     state[0] = if open && first.is_some() { constant(TOUCH) } else { -gap.max(zero) };
+                    if inside {
+                        sum[SUM_DAMPING] = sum[SUM_DAMPING] + constant(0.5) * before * before / penalty;
+                        state[0] = constant(INSIDE);
+                    }
                     continue;
                 };
                 touches = true;

@@ -25,7 +25,7 @@ const SETTLED: f64 = 1e-3;
 const SAME: f64 = 0.01;
 /// Least factor between two steps that are tried before both kinds are known.
 const STRIDE: f64 = 1.05;
-/// Where a step that is never long enough for its own mass is given up, as a multiple of the first.
+/// Where a step that is never long enough for its own mass is given up, as a multiple of the estimate.
 const FAR: f64 = 100.0;
 
 /// A measured limit of the time step.
@@ -97,7 +97,7 @@ impl Simulation {
         };
         let changing = self.changing();
         self.backend.save(&changing);
-        let first = self.dt;
+        let first = self.health.dt_limit;
         let mut oscillation = Oscillation {
             motion: vec![0.0; 3 * nodes],
             inertia: Vec::new(),

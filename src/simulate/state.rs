@@ -154,7 +154,8 @@ impl Simulation {
             let normal: f64 = (0..slots)
                 .map(|s| item * slots + s)
                 .filter(|s| keys[s * penalty::SLOT_KEYS] != EMPTY)
-                .map(|s| state[s * self.model.slot_state].max(0.0))
+                .map(|s| state[s * self.model.slot_state])
+                .filter(|force| *force > penalty::LEAST_FORCE)
                 .sum();
             force[slave.node] = normal;
             slip[slave.node] = slipped.as_ref().map_or(0.0, |slipped| slipped[item]);
