@@ -118,6 +118,7 @@ struct Touch {
     full_radius: f32,
     radius: f32,
     enters: bool,
+    came_in: bool,
     elapsed: f32,
     push: vec3<f32>,
     normal_force: f32,
@@ -163,6 +164,7 @@ fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
 #endif
     let approach = dot(motion, side.normal);
     if (*all).enters && depth > ENTRY - 2.0 * min(approach, 0.0) * (*all).elapsed {
+        (*all).came_in = true;
         return;
     }
     let pressed = press((*all).stiff, depth, inverse_mass, approach);
@@ -249,6 +251,7 @@ fn penalty(item: u32) {
         all.push = vec3<f32>(0.0);
         all.normal_force = 0.0;
         all.touched = false;
+        all.came_in = false;
 #if THREAD
         if !inside {
             touch(&all, found.corners, point);
@@ -283,7 +286,7 @@ fn penalty(item: u32) {
             continue;
         }
         touches = true;
-        states[s] = all.normal_force;
+        states[s] = select(all.normal_force, 0.0, all.came_in);
 #if FRICTION
         let limit = params.friction * all.normal_force;
         let slid = slide(elastic, all.motion * all.elapsed, all.push * (1.0 / size), tangential, limit);

@@ -56,7 +56,8 @@ const STATUS: usize = 14;
 /// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: what is first seen
 /// deeper inside an open yarn came in through its end, and no side pushes it out. Nor does one push a thread that touched the
 /// rim of the end before: its middle is inside as soon as it has passed the rim, and the energy of the touch is lost. A thread that
-/// came in stays [`INSIDE`] until its middle is out again. Bodies may overlap at the start.
+/// came in stays [`INSIDE`] until its middle is out again, and while any side would push it out, a touch of another one does not
+/// count as contact. Bodies may overlap at the start.
 const ENTRY: f64 = 1e-3;
 /// Bound on approach from which on the scene is looked at before it moves, mm/s.
 pub const AT_REST: f64 = 1e20;
@@ -192,6 +193,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                 let mut push = [zero; 3];
                 let mut normal_force = zero;
                 let mut first = None;
+                let mut came_in = false;
                 for (corners, point) in faces {
                     let Some((normal, distance)) = point.normal_and_distance(THREAD) else { continue };
                     let depth = radius - distance;
@@ -212,6 +214,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                     }
                     let approach = dot(motion, normal);
                     if enters && depth > constant(ENTRY) - constant(2.0) * approach.min(zero) * elapsed {
+                        came_in = true;
                         continue;
                     }
                     let Press { elastic_force, pressing, row_sum } =
@@ -244,7 +247,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                     // a point behind a face keeps being looked at
                     let gap = if THREAD || point.height() > zero { point.distance - radius } else { zero };
                     let before = state[0].max(zero);
-                    state[0] = if open && first.is_some() { constant(TOUCH) } else { -gap.max(zero) };
+                    state[0] = if open && first.is_some() && !came_in { constant(TOUCH) } else { -gap.max(zero) };
                     if inside {
                         sum[SUM_DAMPING] = sum[SUM_DAMPING] + constant(0.5) * before * before / penalty;
                         state[0] = constant(INSIDE);
@@ -252,7 +255,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                     continue;
                 };
                 touches = true;
-                state[0] = normal_force;
+                state[0] = if came_in { zero } else { normal_force };
                 if FRICTION {
                     let elastic = [state[1], state[2], state[3]];
                     let limit = real(params.friction) * normal_force;
