@@ -2,7 +2,7 @@
 //!
 //! A beam is a chord of the curve it stands for, and what is tightened is thread along the curve: at full pre-tension
 //! N = EA (l/s − 1 − ε_th), with s the length of the curve. Taken for s, the chords of 60 beams a lap would leave the shipped
-//! cell 0.24 % short of thread, as much as half of its tension. Since beams know chords L₀, the table holds EA L₀/s, and the
+//! cell 0.24 % short of thread, and too tight. Since beams know chords L₀, the table holds EA L₀/s, and the
 //! thermal strain is ε_th s/L₀ + s/L₀ − 1. Threads start at rest as generated, and those that nothing tightens stay so.
 
 use crate::dynamics::assemble::{BENT, NONE, THREAD};
