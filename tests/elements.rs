@@ -23,14 +23,13 @@ type Hexahedra = (&'static str, fn(Value) -> Value);
 /// Both kinds.
 const HEXAHEDRA: [Hexahedra; 2] = [("full", |case| case), ("reduced", reduced)];
 
-/// Forces on all nodes, from the velocities after one short step from rest.
+/// Forces on all nodes at the present positions, at rest.
 fn forces(simulation: &mut Simulation) -> Vec<[f64; 3]> {
     let still = vec![[0.0; 3]; simulation.mesh.nodes.len()];
     simulation.set_velocities(&still);
     let until = simulation.time() + 0.5e-9;
     advance(simulation, until);
-    let mass = simulation.model.mass.clone();
-    simulation.velocities().into_iter().zip(mass).map(|(v, m)| v.map(|v| m * v / 1e-9)).collect()
+    common::forces(simulation)
 }
 
 fn rotation(axis: [f64; 3], angle: f64) -> Tensor<f64> {

@@ -38,16 +38,12 @@ fn energies(case: &Value, moved: &Displacements) -> Energies {
     *simulation.energies()
 }
 
-/// Forces on all nodes, N, from the velocities after one step of a picosecond from rest.
+/// Forces on all nodes, N, at rest.
 fn forces(case: &Value, moved: &Displacements) -> Vec<[f64; 3]> {
-    const STEP: f64 = 1e-12;
-    let case =
-        with(case.clone(), &[("/integration/dt_s", json!(STEP)), ("/steps", json!([{ "hold": { "time_s": 1e-9 } }]))]);
-    let mut simulation = start(&case, F64);
+    let mut simulation = start(&with(case.clone(), &[("/steps", json!([{ "hold": { "time_s": 1e-9 } }]))]), F64);
     simulation.set_fluctuations(moved);
-    advance(&mut simulation, 0.5 * STEP);
-    let masses = simulation.model.mass.clone();
-    simulation.velocities().into_iter().zip(masses).map(|(v, m)| v.map(|v| m * v / STEP)).collect()
+    advance(&mut simulation, 0.5e-9);
+    common::forces(&simulation)
 }
 
 fn nodes(case: &Value) -> Displacements {

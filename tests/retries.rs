@@ -107,7 +107,7 @@ fn retries_run_out() {
     let text = failed(&program(folder, "stopped", &[]).output().unwrap(), 3);
     println!("{text}");
     assert!(text.contains("time step guard at step 0 ") && text.contains("1.250e-5 s is longer"), "{text}");
-    assert!(text.contains(" 2 times the estimated limit"));
+    assert!(text.contains(" 3 times the estimated limit"));
     assert!(text.trim_end().ends_with("(2 retries with shorter steps did not help)"), "{text}");
     let found = summary(&folder.join("stopped"));
     assert_eq!(found["retries"].as_array().unwrap().len(), 2);

@@ -224,6 +224,11 @@ fn height(point: Closest) -> f32 {
     return dot(point.offset, point.normal);
 }
 
+// Whether the slave is behind the inside of the face.
+fn is_behind(point: Closest) -> bool {
+    return point.interior && height(point) < 0.0;
+}
+
 // Whether a point is closer than another, or as close with the slave more in front of its face.
 fn better_than(point: Closest, other: Closest) -> bool {
     let tie = other.distance * 1e-4 + 1e-7;
@@ -308,15 +313,34 @@ fn walk(slave: u32, body: u32, image: vec2<i32>, from_place: Place) -> Walked {
 }
 
 #if THREAD
+// The closest face of all around the slice of one that was found: in front of an open end the two sides of a thin rim may be as
+// near as each other.
+fn around(slave: u32, body: u32, image: vec2<i32>, found: Walked) -> Walked {
+    let ring = ring_of(body);
+    var best = found;
+    for (var step = 1; step < ring; step++) {
+        let place = Place(rem_euclid(found.place.ring + step, ring), found.place.slice);
+        let corners = corners(slave, body, image, place);
+        let point = closest(corners.current);
+        if !is_behind(point) && better_than(point, best.point) {
+            best = Walked(place, corners, point);
+        }
+    }
+    return best;
+}
+
 // Faces that a thread node can touch at once.
 const MOST_TOUCHED: u32 = 12u;
 // Places around the ring that are looked at on either side of the closest face.
 const RING_REACH: i32 = 3;
 
-// Touches all further faces within `reach` (mm) of the slave, found by spreading from the closest one.
+// Touches all further faces within `reach` (mm) of the slave, found by spreading from the closest one; in front of an open end,
+// all around its rim.
 fn faces_within(all: ptr<function, Touch>, slave: u32, body: u32, image: vec2<i32>, first: Walked, reach: f32) {
     let place = first.place;
-    let around = select(1, RING_REACH, ring_of(body) > 2 * RING_REACH);
+    let furthest = select(1, RING_REACH, ring_of(body) > 2 * RING_REACH);
+    let rim = is_rim(body, place, first.point);
+    let front = !is_behind(first.point);
     let borders = borders_within(first.corners, first.point, reach);
     var count = 1u;
     // around the ring, as long as faces are near; then the same in the slices before and after
@@ -331,19 +355,26 @@ fn faces_within(all: ptr<function, Touch>, slave: u32, body: u32, image: vec2<i3
             if !border && !rises(slave, body, image, place, next, first.point) {
                 continue;
             }
-            if !add_near(all, &count, slave, body, image, next, reach) {
+            if !add_near(all, &count, slave, body, image, next, reach, front) {
                 continue;
             }
         }
+        if slice == 0 && rim {
+            for (var k = 1; k < ring_of(body); k++) {
+                let next = Place(place.ring + k, place.slice);
+                add_near(all, &count, slave, body, image, next, reach, front);
+            }
+            continue;
+        }
         for (var step = -1; step <= 1; step += 2) {
             let border = select(borders.high_ring, borders.low_ring, step < 0);
-            for (var k = 1; k <= around; k++) {
+            for (var k = 1; k <= furthest; k++) {
                 let next = Place(place.ring + k * step, place.slice + slice);
                 let beside = Place(next.ring, place.slice);
                 if k == 1 && !border && !rises(slave, body, image, place, beside, first.point) {
                     break;
                 }
-                if !add_near(all, &count, slave, body, image, next, reach) {
+                if !add_near(all, &count, slave, body, image, next, reach, front) {
                     break;
                 }
             }
@@ -351,7 +382,8 @@ fn faces_within(all: ptr<function, Touch>, slave: u32, body: u32, image: vec2<i3
     }
 }
 
-// Touches a face if it is within reach; says whether it is.
+// Touches a face if it is within reach; says whether it is. Where the first one is seen from the `front`, one that is seen from
+// behind is the other side of a thin edge.
 fn add_near(
     all: ptr<function, Touch>,
     count: ptr<function, u32>,
@@ -360,13 +392,14 @@ fn add_near(
     image: vec2<i32>,
     place: Place,
     reach: f32,
+    front: bool,
 ) -> bool {
     if *count == MOST_TOUCHED {
         return false;
     }
     let corners = corners(slave, body, image, place);
     let point = closest(corners.current);
-    let is_near = point.distance < reach;
+    let is_near = point.distance < reach && !(front && is_behind(point));
     if is_near {
         touch(all, corners, point);
         *count = *count + 1u;

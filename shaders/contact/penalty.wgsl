@@ -226,14 +226,19 @@ fn penalty(item: u32) {
             }
         }
         let from_place = Place(i32(keys[k + 1u]), i32(keys[k + 2u]));
-        let found = walk(slave, candidate.body, candidate.image, from_place);
-        let point = found.point;
-        keys[k + 1u] = u32(found.place.ring);
-        keys[k + 2u] = u32(found.place.slice);
         var open = true;
 #if PERIODIC
         open = !is_closed(candidate.body);
 #endif
+        var found = walk(slave, candidate.body, candidate.image, from_place);
+#if THREAD
+        if open && is_rim(candidate.body, found.place, found.point) {
+            found = around(slave, candidate.body, candidate.image, found);
+        }
+#endif
+        let point = found.point;
+        keys[k + 1u] = u32(found.place.ring);
+        keys[k + 2u] = u32(found.place.slice);
         let moves = row.approach < AT_REST;
 #if THREAD
         var inside = false;
@@ -273,16 +278,17 @@ fn penalty(item: u32) {
             states[s + 2u] = 0.0;
             states[s + 3u] = 0.0;
 #endif
-            // a point behind a face keeps being looked at
-            let gap = select(0.0, point.distance - all.radius, IS_THREAD || height(point) > 0.0);
-            let before = max(states[s], 0.0);
-            states[s] = select(-max(gap, 0.0), TOUCH, open && all.touched);
 #if THREAD
             if inside {
+                let before = max(states[s], 0.0);
                 add_sum(item, SUM_DAMPING, 0.5 * before * before / all.stiff);
                 states[s] = INSIDE;
+                continue;
             }
 #endif
+            // a point behind a face keeps being looked at
+            let gap = select(0.0, point.distance - all.radius, IS_THREAD || height(point) > 0.0);
+            states[s] = select(-max(gap, 0.0), TOUCH, open && all.touched);
             continue;
         }
         touches = true;

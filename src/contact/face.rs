@@ -156,6 +156,29 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
         place.ring = place.ring.rem_euclid(b.ring as i32);
         (place, corners, point)
     }
+
+    /// The closest face of all around the slice of one that was found. In front of an open end the two sides of a thin rim may
+    /// be as near as each other, and a walk stays on the one that it began on.
+    #[inline(always)]
+    pub fn around(
+        &self,
+        slave: usize,
+        body: usize,
+        image: [i32; 2],
+        found: (Place, Corners<R>, Closest<R>),
+    ) -> (Place, Corners<R>, Closest<R>) {
+        let ring = self.bodies[body].ring as i32;
+        let mut best = found;
+        for step in 1..ring {
+            let place = Place { ring: (found.0.ring + step).rem_euclid(ring), ..found.0 };
+            let corners = self.corners(slave, body, image, place);
+            let point = closest(&corners.current);
+            if !point.is_behind() && point.better_than(&best.2) {
+                best = (place, corners, point);
+            }
+        }
+        best
+    }
 }
 
 /// Faces that a thread node can touch at once.
@@ -170,7 +193,8 @@ pub struct Near<R> {
 }
 
 impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
-    /// All faces within `reach` (mm) of the slave, the closest one first, found by spreading from it.
+    /// All faces within `reach` (mm) of the slave, the closest one first, found by spreading from it; in front of an open end, all
+    /// around its rim.
     ///
     /// Each keeps its own distance, whether its inside, edge or corner is closest: the sum of their penalties is an energy
     /// without jumps, also where a thread lies in a fold of a crushed surface or passes an edge. The closest face alone
@@ -189,6 +213,7 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
         let wide = b.ring as i32 > 2 * RING_REACH;
         let (touches_back, touches_on) = borders_within(&first.0, &first.1, reach);
         let steps = [(-1, touches_back.0), (1, touches_on.0)];
+        let rim = self.is_rim(body, place, &first.1);
         let mut near = Near { count: 1, faces: [first; MOST_TOUCHED] };
         // around the ring, as long as faces are near; then the same in the slices before and after
         for slice in [0, -1, 1] {
@@ -204,6 +229,13 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
                 if !self.add_near(&mut near, slave, body, image, next, reach) {
                     continue;
                 }
+            }
+            if slice == 0 && rim {
+                for k in 1..b.ring as i32 {
+                    let next = Place { ring: place.ring + k, ..place };
+                    self.add_near(&mut near, slave, body, image, next, reach);
+                }
+                continue;
             }
             for (step, border) in steps {
                 for k in 1..=if wide { RING_REACH } else { 1 } {
@@ -221,7 +253,8 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
         near
     }
 
-    /// Adds a face if it is within reach; says whether it is.
+    /// Adds a face if it is within reach; says whether it is. Where the first one is seen from the front, one that is seen from
+    /// behind is the other side of a thin edge.
     #[inline(always)]
     fn add_near(&self, near: &mut Near<R>, slave: usize, body: usize, image: [i32; 2], place: Place, reach: R) -> bool {
         if near.count == MOST_TOUCHED {
@@ -229,7 +262,7 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
         }
         let corners = self.corners(slave, body, image, place);
         let point = closest(&corners.current);
-        let is_near = point.distance < reach;
+        let is_near = point.distance < reach && (near.faces[0].1.is_behind() || !point.is_behind());
         if is_near {
             near.faces[near.count] = (corners, point);
             near.count += 1;
@@ -361,6 +394,12 @@ impl<R: Real> Closest<R> {
     #[inline(always)]
     pub fn height(&self) -> R {
         dot(self.offset, self.normal)
+    }
+
+    /// Whether the slave is behind the inside of the face.
+    #[inline(always)]
+    fn is_behind(&self) -> bool {
+        self.interior && self.height() < R::from_f64(0.0)
     }
 
     /// Whether this point is closer than another, or as close with the slave more in front of its face.

@@ -164,9 +164,13 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                     }
                 }
                 let from = Place { ring: at[1] as i32, slice: at[2] as i32 };
-                let (place, corners, point) = surface.walk(slave, body, image, from);
-                (at[1], at[2]) = (place.ring as u32, place.slice as u32);
                 let open = !surface.is_closed(body);
+                let mut found = surface.walk(slave, body, image, from);
+                if THREAD && open && surface.is_rim(body, found.0, &found.2) {
+                    found = surface.around(slave, body, image, found);
+                }
+                let (place, corners, point) = found;
+                (at[1], at[2]) = (place.ring as u32, place.slice as u32);
                 let moves = io.row.approach < constant(AT_REST);
                 let mut inside = false;
                 if THREAD && open && moves {
@@ -244,14 +248,15 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                         sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
                         state[1..].fill(zero);
                     }
-                    // a point behind a face keeps being looked at
-                    let gap = if THREAD || point.height() > zero { point.distance - radius } else { zero };
-                    let before = state[0].max(zero);
-                    state[0] = if open && first.is_some() && !came_in { constant(TOUCH) } else { -gap.max(zero) };
                     if inside {
+                        let before = state[0].max(zero);
                         sum[SUM_DAMPING] = sum[SUM_DAMPING] + constant(0.5) * before * before / penalty;
                         state[0] = constant(INSIDE);
+                        continue;
                     }
+                    // a point behind a face keeps being looked at
+                    let gap = if THREAD || point.height() > zero { point.distance - radius } else { zero };
+                    state[0] = if open && first.is_some() && !came_in { constant(TOUCH) } else { -gap.max(zero) };
                     continue;
                 };
                 touches = true;

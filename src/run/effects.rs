@@ -4,7 +4,7 @@ use crate::case::FabricSource;
 use crate::case::domain::{Domain, ThreadEnds};
 use crate::case::effects::Contact;
 use crate::case::read::Loaded;
-use crate::contact::{EMPTY, penalty};
+use crate::contact::EMPTY;
 use crate::kernel::buffer::Buffer;
 use crate::simulate::Simulation;
 
@@ -26,7 +26,7 @@ impl Effect {
             let mut loaded = loaded.clone();
             off(&mut loaded);
             if let (Some(fabric), Some(FabricSource::Inline(inline))) = (&loaded.fabric, &mut loaded.case.fabric) {
-                inline.clone_from(&Box::new(fabric.clone()));
+                (**inline).clone_from(fabric);
             }
             loaded
         })
@@ -66,7 +66,7 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
             .map(largest)
             .fold(0.0, |most: f64, x| if x.abs() > most.abs() { x } else { most })
     };
-    let [threads_near, yarns_near, beams_near] = near(simulation);
+    let [threads_near, yarns_near, pairs_near] = near(simulation);
     let skin = effects.contact.as_ref().map_or(0.0, |contact| contact.skin_mm);
     add(
         active.thread_yarn,
@@ -97,7 +97,7 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
         "thread-thread contact",
         &|| {
             format!(
-                "{}; {beams_near} beams are closer than {skin} mm to another beam",
+                "{}; {pairs_near} pairs of beams are closer than {skin} mm",
                 written("effects.contact.thread_thread")
             )
         },
@@ -185,13 +185,13 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
         Some(|l| l.case.effects.contact_mass = None),
     );
     let (mass, truly) = (&simulation.model.mass, &simulation.model.true_mass);
-    let lighter = mass.iter().zip(truly).filter(|(mass, truly)| mass > truly).count();
+    let heavier = mass.iter().zip(truly).filter(|(mass, truly)| mass > truly).count();
     add(
-        lighter > 0,
+        heavier > 0,
         "mass floor",
         &|| {
             format!(
-                "{}; {lighter} nodes are lighter than {} of the mean of their body",
+                "{}; {heavier} nodes would be lighter than {} of the mean of their body",
                 written("effects.mass_floor"),
                 effects.mass_floor
             )
@@ -215,25 +215,22 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
         true,
         "energies by mode",
         &|| "guards look at the balance of energies between steps".into(),
-        &["hex8 energy", "totals", "totals taken", "kinetic energy", "axial energy"],
+        &["hex8 energy", "hex8 reduced energy", "totals", "totals taken", "kinetic energy", "axial energy"],
         None,
     );
     found
 }
 
-/// Nodes of threads and of yarns that have a yarn within reach, and beams that have a beam.
+/// Nodes of threads and of yarns that have a yarn within reach, and pairs of beams within reach of each other.
 fn near(simulation: &Simulation) -> [usize; 3] {
     let buffers = &simulation.model.buffers;
-    let first_keys = |buffer: Option<Buffer>, items: usize| {
-        let keys = buffer.map_or_else(Vec::new, |buffer| simulation.backend().uints(buffer));
-        let row = keys.len() / items.max(1);
-        keys.chunks_exact(row.max(penalty::SLOT_KEYS)).map(|keys| keys[0] != EMPTY).collect::<Vec<bool>>()
-    };
+    let keys = |buffer: Option<Buffer>| buffer.map_or_else(Vec::new, |buffer| simulation.backend().uints(buffer));
     let slaves = &simulation.model.slaves;
-    let faces = first_keys(buffers.contact_keys, slaves.len());
+    let faces = keys(buffers.contact_keys);
+    let row = (faces.len() / slaves.len().max(1)).max(1);
     let of = |is_thread: bool| {
-        faces.iter().zip(slaves).filter(|(near, slave)| **near && slave.is_thread == is_thread).count()
+        let nodes = faces.chunks_exact(row).zip(slaves).filter(|(_, slave)| slave.is_thread == is_thread);
+        nodes.filter(|(keys, _)| keys[0] != EMPTY).count()
     };
-    let beams = first_keys(buffers.pair_keys, simulation.mesh.beams());
-    [of(true), of(false), beams.into_iter().filter(|near| *near).count()]
+    [of(true), of(false), keys(buffers.pair_keys).iter().filter(|key| **key != EMPTY).count()]
 }

@@ -54,14 +54,14 @@ impl Start {
     }
 }
 
-/// Whether a place of a case may change between a run and another that starts from its state after `phases` load steps: names, outputs, later
-/// steps, and time integration but for what fixes the bits of the state.
+/// Whether a place of a case may change between a run and another that starts from its state after `phases` load steps: names,
+/// outputs, later steps, and time integration but for what fixes the bits of the state and the energy in it.
 pub fn may_differ(place: &str, phases: usize) -> bool {
     let later = |n: &str| n.parse::<usize>().is_ok_and(|n| n >= phases);
     match place.split_once('.') {
         None => matches!(place, "title" | "accuracy" | "output"),
         Some(("steps", n)) => later(n),
-        Some(("integration", name)) => !matches!(name, "precision" | "perturbation_quanta"),
+        Some(("integration", name)) => !matches!(name, "precision" | "perturbation_quanta" | "hexahedra" | "hourglass"),
         Some(_) => false,
     }
 }

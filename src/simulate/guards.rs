@@ -1,12 +1,15 @@
 //! Guards: each names the cause, where it was, its size, and what to change.
 
 use super::Simulation;
-use crate::contact::status;
+use crate::contact::penalty::{LEAST_FORCE, SLOT_KEYS};
+use crate::contact::{EMPTY, of_key, status};
 use crate::error::{Error, Guard, Result};
+use crate::kernel::buffer::Buffer;
 use crate::kernel::position::MOST_MM;
 
-/// A step that is longer than the estimated limit by this factor is unstable for sure: the estimate is a bound from below.
-const SURELY_UNSTABLE: f64 = 2.0;
+/// A step that is longer than the estimated limit by this factor is taken for unstable: the estimate is a bound from below, and
+/// measured limits were up to 2.5 times as large.
+const SURELY_UNSTABLE: f64 = 3.0;
 
 impl Simulation {
     pub(super) fn guards(&self) -> Result<()> {
@@ -44,13 +47,42 @@ impl Simulation {
             ("a yarn into a yarn", l.yarn_thickness),
             ("a thread into a thread", l.thread_radius),
         ];
-        for ((what, size), depth) in kinds.into_iter().zip(h.penetration) {
+        for (kind, ((what, size), depth)) in kinds.into_iter().zip(h.penetration).enumerate() {
             if depth > allowed * size && self.schedule.load(self.time).radius >= 1.0 {
-                let culprit = format!("{what} by {depth:.4} mm (tolerance {:.4} mm)", allowed * size);
+                let place = self.deepest(kind).map_or_else(String::new, |place| format!("; deepest now: {place}"));
+                let culprit = format!("{what} by {depth:.4} mm (tolerance {:.4} mm){place}", allowed * size);
                 return Err(self.guard("penetration", culprit, "raise the contact penalties or load more slowly"));
             }
         }
         Ok(())
+    }
+
+    /// The contact of a kind (as in [`Health::penetration`](super::Health)) whose force is largest for its stiffness; `None` if
+    /// nothing touches any more.
+    fn deepest(&self, kind: usize) -> Option<String> {
+        let b = &self.model.buffers;
+        let size = self.model.slot_state;
+        // items with the stiffness of each, and what a key says of the other body
+        let find = |keys: Buffer, state: Buffer, stride: usize, slots: usize, items: &[(usize, f64)]| {
+            let (keys, state) = (self.backend.uints(keys), self.backend.scalars(state));
+            let slots =
+                items.iter().flat_map(|(item, measure)| (0..slots).map(move |s| (*item, item * slots + s, measure)));
+            let touching =
+                slots.filter(|(_, slot, _)| keys[stride * slot] != EMPTY && state[size * slot] > LEAST_FORCE);
+            let deepest = touching.max_by(|a, b| (state[size * a.1] / a.2).total_cmp(&(state[size * b.1] / b.2)));
+            deepest.map(|(item, slot, _)| (item, of_key(keys[stride * slot]).0))
+        };
+        if kind == 2 {
+            let beams: Vec<(usize, f64)> = (0..self.mesh.beams()).map(|beam| (beam, 1.0)).collect();
+            let (beam, other) = find(b.pair_keys?, b.pair_state?, 1, self.capacity.beam_slots, &beams)?;
+            return Some(format!("beams {beam} and {other}"));
+        }
+        let slaves = self.model.slaves.iter().enumerate().filter(|(_, slave)| slave.is_thread == (kind == 0));
+        let slaves: Vec<(usize, f64)> = slaves.map(|(item, slave)| (item, slave.measure)).collect();
+        let (item, body) = find(b.contact_keys?, b.contact_state?, SLOT_KEYS, self.capacity.slots, &slaves)?;
+        let node = self.model.slaves[item].node;
+        let body = &self.mesh.blocks[body].name;
+        Some(format!("node {node} ({}) in {body}", self.node_owner(node)))
     }
 
     /// Stops a step that the user fixed and that cannot be stable; one that follows the estimate shortens by itself.

@@ -46,7 +46,7 @@ pub fn common(curves: &[&[[f64; 2]]]) -> Option<[f64; 2]> {
 }
 
 /// Means of a curve over `half` to both sides of every centre, as far as the curve reaches; NaN where it does not.
-pub fn averaged(curve: &[[f64; 2]], centres: &[f64], half: f64) -> Vec<f64> {
+fn averaged(curve: &[[f64; 2]], centres: &[f64], half: f64) -> Vec<f64> {
     let mut integral = vec![0.0];
     for pair in curve.windows(2) {
         let [[x0, y0], [x1, y1]] = [pair[0], pair[1]];
@@ -87,24 +87,24 @@ pub fn relative_l2(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Root mean square of a/b − 1.
-pub fn relative_rms(a: &[f64], b: &[f64]) -> f64 {
+fn relative_rms(a: &[f64], b: &[f64]) -> f64 {
     let squares = a.iter().zip(b).map(|(a, b)| if a == b { 0.0 } else { (a / b - 1.0) * (a / b - 1.0) });
     libm::sqrt(squares.sum::<f64>() / a.len() as f64)
 }
 
 /// Mean of some lists of the same length, entry by entry.
-pub fn mean(lists: &[Vec<f64>]) -> Vec<f64> {
+fn mean(lists: &[Vec<f64>]) -> Vec<f64> {
     let entries = 0..lists.first().map_or(0, Vec::len);
     entries.map(|i| lists.iter().map(|list| list[i]).sum::<f64>() / lists.len() as f64).collect()
 }
 
-/// Scatter of runs that should agree: root mean square of their distances `apart` from their mean. NaN for less than two.
-pub fn spread(lists: &[Vec<f64>], apart: impl Fn(&[f64], &[f64]) -> f64) -> f64 {
+/// Scatter of runs that should agree: root mean square of their distances from their mean in L2. NaN for less than two.
+pub fn spread(lists: &[Vec<f64>]) -> f64 {
     if lists.len() < 2 {
         return f64::NAN;
     }
     let centre = mean(lists);
-    let squares: f64 = lists.iter().map(|list| apart(list, &centre).powi(2)).sum();
+    let squares: f64 = lists.iter().map(|list| relative_l2(list, &centre).powi(2)).sum();
     libm::sqrt(squares / lists.len() as f64)
 }
 
@@ -154,9 +154,9 @@ mod tests {
     #[test]
     fn spread_of_two_runs_is_half_of_their_distance() {
         let lists = [vec![1.01, 2.02], vec![0.99, 1.98]];
-        let spread = spread(&lists, relative_l2);
+        let spread = spread(&lists);
         assert!((spread - 0.01).abs() < 1e-12, "{spread}");
         assert!((by_chance(spread, 2) - 0.02).abs() < 1e-12);
-        assert!(super::spread(&lists[..1], relative_l2).is_nan());
+        assert!(super::spread(&lists[..1]).is_nan());
     }
 }

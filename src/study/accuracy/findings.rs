@@ -2,7 +2,7 @@
 
 use super::points::{Point, Ran, Role};
 use crate::error::Result;
-use crate::study::difference::{Curve, Difference, by_chance, difference, relative_l2, smoothed, spread};
+use crate::study::difference::{Curve, Difference, by_chance, difference, smoothed, spread};
 use crate::study::results::{MEASURES, Measure, Results};
 use std::path::PathBuf;
 
@@ -52,7 +52,7 @@ impl Findings {
         let alike: Vec<Vec<Curve>> = alike.filter_map(|row| row.results.as_ref()).map(|r| curves(Some(r))).collect();
         let scatter = |k: usize| {
             let alike: Vec<&[[f64; 2]]> = alike.iter().map(|curves| curves[k].as_slice()).collect();
-            smoothed(&alike).map_or(f64::NAN, |means| by_chance(spread(&means, relative_l2), means.len()))
+            smoothed(&alike).map_or(f64::NAN, |means| by_chance(spread(&means), means.len()))
         };
         let chance = (0..measures.len()).map(scatter).collect();
         let from = |own: &[Curve], other: &[Curve]| own.iter().zip(other).map(|(a, b)| difference(a, b)).collect();

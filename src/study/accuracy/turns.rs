@@ -98,7 +98,7 @@ pub const TURNS: &[Turn] = &[
     turn("beams", "beams × 2", &[(BEAMS, Times(2.0))]),
     turn("time step", "time step × 0.5", &[(LARGEST_DT, Times(0.5))]),
     turn("time step", "time step × 1.5", &[(LARGEST_DT, Times(1.5))]),
-    turn("least limit", "time step × 2, heavier elements", &[(LARGEST_DT, Times(2.0)), (LEAST_LIMIT, To("2.3e-6"))]),
+    turn("least limit", "heavier elements", &[(LARGEST_DT, Times(2.0)), (LEAST_LIMIT, To("2.3e-6"))]),
     turn("fibre lines", "β × 0.5", &[("effects.fibre_lines.beta", Times(0.5))]),
     turn("fibre lines", "β × 2", &[("effects.fibre_lines.beta", Times(2.0))]),
     turn("contact mass", "contact mass × 0.5", &[(MASS_FACTOR, Times(0.5))]),
