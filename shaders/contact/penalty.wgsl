@@ -94,7 +94,7 @@ fn add_virial(item: u32, push: vec3<f32>, apart: vec3<f32>) {
 @group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
 
 // From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: what is first seen
-// deeper inside an open yarn came in through its end, and no side pushes it out.
+// deeper inside an open yarn came in through its end, and no side pushes it out; nor does one that is found late, see the twin.
 const ENTRY: f32 = 1e-3;
 // Bound on approach from which on the scene is looked at before it moves, mm/s.
 const AT_REST: f32 = 1e20;
@@ -117,8 +117,10 @@ struct Touch {
     stiff: f32,
     full_radius: f32,
     radius: f32,
+    open: bool,
     enters: bool,
     came_in: bool,
+    before: f32,
     elapsed: f32,
     push: vec3<f32>,
     normal_force: f32,
@@ -163,8 +165,10 @@ fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
     motion = motion + apply(rate(), apart);
 #endif
     let approach = dot(motion, side.normal);
-    if (*all).enters && depth > ENTRY - 2.0 * min(approach, 0.0) * (*all).elapsed {
-        (*all).came_in = true;
+    let entry = ENTRY - 2.0 * min(approach, 0.0) * (*all).elapsed;
+    let late = IS_THREAD && (*all).open && depth > 0.5 * (*all).radius;
+    if ((*all).enters || late) && depth > (*all).before + entry {
+        (*all).came_in = (*all).came_in || (*all).enters;
         return;
     }
     let pressed = press((*all).stiff, depth, inverse_mass, approach);
@@ -252,7 +256,9 @@ fn penalty(item: u32) {
             }
         }
 #endif
-        all.enters = open && moves && states[s] <= 0.0;
+        all.open = open && moves;
+        all.enters = all.open && states[s] <= 0.0;
+        all.before = max(states[s], 0.0) / all.stiff;
         all.push = vec3<f32>(0.0);
         all.normal_force = 0.0;
         all.touched = false;
@@ -280,8 +286,7 @@ fn penalty(item: u32) {
 #endif
 #if THREAD
             if inside {
-                let before = max(states[s], 0.0);
-                add_sum(item, SUM_DAMPING, 0.5 * before * before / all.stiff);
+                add_sum(item, SUM_DAMPING, 0.5 * all.stiff * all.before * all.before);
                 states[s] = INSIDE;
                 continue;
             }

@@ -57,7 +57,8 @@ const STATUS: usize = 14;
 /// deeper inside an open yarn came in through its end, and no side pushes it out. Nor does one push a thread that touched the
 /// rim of the end before: its middle is inside as soon as it has passed the rim, and the energy of the touch is lost. A thread that
 /// came in stays [`INSIDE`] until its middle is out again, and while any side would push it out, a touch of another one does not
-/// count as contact. Bodies may overlap at the start.
+/// count as contact. A side of an open yarn that is found late, deeper than half a thread and than the contact was a step ago, is not
+/// one either: it has been passed where the surface is folded. Bodies may overlap at the start.
 const ENTRY: f64 = 1e-3;
 /// Bound on approach from which on the scene is looked at before it moves, mm/s.
 pub const AT_REST: f64 = 1e20;
@@ -183,6 +184,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                     }
                 }
                 let enters = open && moves && state[0] <= zero;
+                let before = state[0].max(zero) / penalty;
                 let (near, single);
                 let faces = if inside {
                     &[][..]
@@ -217,8 +219,10 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                         motion = add(motion, apply(&io.row.rate, apart));
                     }
                     let approach = dot(motion, normal);
-                    if enters && depth > constant(ENTRY) - constant(2.0) * approach.min(zero) * elapsed {
-                        came_in = true;
+                    let entry = constant(ENTRY) - constant(2.0) * approach.min(zero) * elapsed;
+                    let late = THREAD && open && moves && depth > constant(0.5) * radius;
+                    if (enters || late) && depth > before + entry {
+                        came_in |= enters;
                         continue;
                     }
                     let Press { elastic_force, pressing, row_sum } =
@@ -249,8 +253,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                         state[1..].fill(zero);
                     }
                     if inside {
-                        let before = state[0].max(zero);
-                        sum[SUM_DAMPING] = sum[SUM_DAMPING] + constant(0.5) * before * before / penalty;
+                        sum[SUM_DAMPING] = sum[SUM_DAMPING] + constant(0.5) * penalty * before * before;
                         state[0] = constant(INSIDE);
                         continue;
                     }
