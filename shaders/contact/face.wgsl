@@ -319,12 +319,39 @@ fn around(slave: u32, body: u32, image: vec2<i32>, found: Walked) -> Walked {
     let ring = ring_of(body);
     var best = found;
     for (var step = 1; step < ring; step++) {
-        let place = Place(rem_euclid(found.place.ring + step, ring), found.place.slice);
-        let corners = corners(slave, body, image, place);
-        let point = closest(corners.current);
-        if !is_behind(point) && better_than(point, best.point) {
-            best = Walked(place, corners, point);
+        best = closer(best, slave, body, image, Place(rem_euclid(found.place.ring + step, ring), found.place.slice));
+    }
+    return best;
+}
+
+// The closest face of one where a walk has ended and those beside it that rise above it: in front of a fold each of its sides may
+// be where a walk ends.
+fn beside(slave: u32, body: u32, image: vec2<i32>, found: Walked) -> Walked {
+    let place = found.place;
+    var best = found;
+    for (var step = -1; step <= 1; step += 2) {
+        for (var k = 1; k <= RING_REACH; k++) {
+            let next = Place(place.ring + k * step, place.slice);
+            if k == 1 && !rises(slave, body, image, place, next, found.point) {
+                break;
+            }
+            best = closer(best, slave, body, image, next);
         }
+        let next = Place(place.ring, place.slice + step);
+        if has_slice(body, next.slice) && rises(slave, body, image, place, next, found.point) {
+            best = closer(best, slave, body, image, next);
+        }
+    }
+    best.place.ring = rem_euclid(best.place.ring, ring_of(body));
+    return best;
+}
+
+// A face instead of another one if it is closer and not seen from behind.
+fn closer(best: Walked, slave: u32, body: u32, image: vec2<i32>, place: Place) -> Walked {
+    let corners = corners(slave, body, image, place);
+    let point = closest(corners.current);
+    if !is_behind(point) && better_than(point, best.point) {
+        return Walked(place, corners, point);
     }
     return best;
 }

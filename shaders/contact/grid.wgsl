@@ -18,7 +18,7 @@ fn clear(cell: u32) {
 #endif
 #include "contact/face"
 #if fill_beams
-#include "elements/beam2"
+#include "contact/bow"
 #endif
 
 // Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm, half sizes in the plane, mm (2).
@@ -100,7 +100,9 @@ const WRITES: u32 = 6u;
 #else
 @group(1) @binding(3) var<storage, read> ends: array<u32>;
 @group(1) @binding(4) var<storage, read> beams: array<f32>;
-const WRITES: u32 = 5u;
+@group(1) @binding(5) var<storage, read> neighbours: array<u32>;
+@group(1) @binding(6) var<storage, read> shares: array<f32>;
+const WRITES: u32 = 7u;
 #endif
 @group(1) @binding(WRITES) var<storage, read_write> counts: array<atomic<u32>>;
 @group(1) @binding(WRITES + 1u) var<storage, read_write> lists: array<u32>;
@@ -169,7 +171,9 @@ fn fill_beams(item: u32) {
     let back = inverse();
     let beam = item - params.slabs;
     let along = vector(beam);
-    let bounds = grow(Bounds(vec3<f32>(0.0), vec3<f32>(0.0)), back, along.reference + along.change);
+    let aside = bow(beam).current;
+    var bounds = grow(Bounds(vec3<f32>(0.0), vec3<f32>(0.0)), back, aside);
+    bounds = grow(bounds, back, aside + (along.reference + along.change));
     put(item, ends[2u * beam], back, bounds, 2.0 * params.thread_radius + params.skin);
 }
 #endif

@@ -239,6 +239,9 @@ fn penalty(item: u32) {
         if open && is_rim(candidate.body, found.place, found.point) {
             found = around(slave, candidate.body, candidate.image, found);
         }
+        if found.point.distance >= all.radius && !is_behind(found.point) {
+            found = beside(slave, candidate.body, candidate.image, found);
+        }
 #endif
         let point = found.point;
         keys[k + 1u] = u32(found.place.ring);

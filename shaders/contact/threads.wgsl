@@ -1,4 +1,4 @@
-// Contact of beams with beams: closest points of two segments, penalty and friction as for faces.
+// Contact of beams with beams: closest points of two segments, the beams' lines, penalty and friction as for faces.
 
 #define STATUS
 #if force
@@ -8,7 +8,7 @@
 #endif
 #include "contact/grid"
 #include "contact/penalty"
-#include "elements/beam2"
+#include "contact/bow"
 
 // Numbers of a beam's place on its thread: arc length of its middle, mm; its length, mm; length of a closed thread, mm, else 0.
 const ARC: u32 = 3u;
@@ -50,26 +50,30 @@ fn unit(x: f32) -> f32 {
 @group(1) @binding(2) var<storage, read> reference: array<i32>;
 @group(1) @binding(3) var<storage, read> quanta: array<i32>;
 @group(1) @binding(4) var<storage, read> remainder: array<f32>;
+@group(1) @binding(5) var<storage, read> neighbours: array<u32>;
+@group(1) @binding(6) var<storage, read> shares: array<f32>;
 
-// From the first node of beam `a` to the first node of beam `b` in an image, in the reference and now.
-fn between(a: u32, b: u32, image: vec2<i32>) -> FromSlave {
+// From the line of beam `a`, which lies `aside` of its chord, to that of `b` in an image, in the reference and now.
+fn between(a: u32, aside: Bow, b: u32, image: vec2<i32>) -> FromSlave {
 #if PERIODIC
-    return from_slave(ends[2u * a], Imaged(ends[2u * b], image * params.period));
+    let chords = from_slave(ends[2u * a], Imaged(ends[2u * b], image * params.period));
 #else
-    return from_slave(ends[2u * a], Imaged(ends[2u * b], image));
+    let chords = from_slave(ends[2u * a], Imaged(ends[2u * b], image));
 #endif
+    let other = bow(b);
+    return FromSlave(chords.reference + (other.reference - aside.reference), chords.current + (other.current - aside.current));
 }
 
 #if pairs
-@group(1) @binding(5) var<storage, read> threads: array<u32>;
-@group(1) @binding(6) var<storage, read> arcs: array<f32>;
-@group(1) @binding(7) var<storage, read> counts: array<u32>;
-@group(1) @binding(8) var<storage, read> lists: array<u32>;
+@group(1) @binding(7) var<storage, read> threads: array<u32>;
+@group(1) @binding(8) var<storage, read> arcs: array<f32>;
+@group(1) @binding(9) var<storage, read> counts: array<u32>;
+@group(1) @binding(10) var<storage, read> lists: array<u32>;
 #if PERIODIC
-@group(1) @binding(9) var<storage, read> boxes: array<f32>;
-const WRITES: u32 = 10u;
+@group(1) @binding(11) var<storage, read> boxes: array<f32>;
+const WRITES: u32 = 12u;
 #else
-const WRITES: u32 = 9u;
+const WRITES: u32 = 11u;
 #endif
 @group(1) @binding(WRITES) var<storage, read_write> keys: array<u32>;
 @group(1) @binding(WRITES + 1u) var<storage, read_write> states: array<f32>;
@@ -79,7 +83,7 @@ const WRITES: u32 = 9u;
 const MOST_PAIRS: u32 = 64u;
 
 // Whether two beams are neighbours on one thread.
-fn neighbours(a: u32, b: u32) -> bool {
+fn are_neighbours(a: u32, b: u32) -> bool {
     if threads[a] != threads[b] {
         return false;
     }
@@ -101,7 +105,8 @@ fn pairs(beam: u32) {
 #endif
     let own = vector(beam);
     let along = own.reference + own.change;
-    let start = absolute(back, ends[2u * beam]).xy;
+    let aside = bow(beam);
+    let start = absolute(back, ends[2u * beam]).xy + pull_back(back, aside.current);
     let end = start + pull_back(back, along);
     let xs = cells(0u, min(start.x, end.x), max(start.x, end.x));
     let ys = cells(1u, min(start.y, end.y), max(start.y, end.y));
@@ -121,7 +126,7 @@ fn pairs(beam: u32) {
                     continue;
                 }
                 let other = near - params.slabs;
-                if neighbours(beam, other) {
+                if are_neighbours(beam, other) {
                     continue;
                 }
                 var image = vec2<i32>(0);
@@ -133,7 +138,7 @@ fn pairs(beam: u32) {
                     image.y = to_i32((middle.y - boxes[BOX * near + 1u]) / period.y);
                 }
 #endif
-                let apart = between(beam, other, image).current;
+                let apart = between(beam, aside, other, image).current;
                 let theirs = vector(other);
                 let direction = theirs.reference + theirs.change;
                 let st = closest_points(along, direction, apart);
@@ -196,19 +201,14 @@ fn pairs(beam: u32) {
 #endif
 
 #if force
-@group(1) @binding(5) var<storage, read> velocity: array<f32>;
-@group(1) @binding(6) var<storage, read> mass: array<f32>;
-@group(1) @binding(7) var<storage, read_write> keys: array<u32>;
-@group(1) @binding(8) var<storage, read_write> states: array<f32>;
-@group(1) @binding(9) var<storage, read_write> sums: array<f32>;
-@group(1) @binding(10) var<storage, read_write> forces: array<atomic<i32>>;
-@group(1) @binding(11) var<storage, read_write> stiffness: array<atomic<i32>>;
-@group(1) @binding(12) var<storage, read_write> status: array<atomic<u32>>;
-
-// The ends of a beam with the weights of a point on it.
-fn ends_of(beam: u32, s: f32) -> Weighted {
-    return Weighted(2u, vec4<u32>(ends[2u * beam], ends[2u * beam + 1u], 0u, 0u), vec4<f32>(1.0 - s, s, 0.0, 0.0));
-}
+@group(1) @binding(7) var<storage, read> velocity: array<f32>;
+@group(1) @binding(8) var<storage, read> mass: array<f32>;
+@group(1) @binding(9) var<storage, read_write> keys: array<u32>;
+@group(1) @binding(10) var<storage, read_write> states: array<f32>;
+@group(1) @binding(11) var<storage, read_write> sums: array<f32>;
+@group(1) @binding(12) var<storage, read_write> forces: array<atomic<i32>>;
+@group(1) @binding(13) var<storage, read_write> stiffness: array<atomic<i32>>;
+@group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
 
 fn force(beam: u32) {
     let slots = params.beam_slots;
@@ -224,6 +224,7 @@ fn force(beam: u32) {
     var touches = false;
     let own = vector(beam);
     let along = own.reference + own.change;
+    let aside = bow(beam);
     for (var slot = 0u; slot < slots; slot++) {
         let pair = keys[slots * beam + slot];
         if pair == EMPTY {
@@ -231,7 +232,7 @@ fn force(beam: u32) {
         }
         let candidate = of_key(pair);
         let other = candidate.body;
-        let apart = between(beam, other, candidate.image);
+        let apart = between(beam, aside, other, candidate.image);
         let theirs = vector(other);
         let direction = theirs.reference + theirs.change;
         let st = closest_points(along, direction, apart.current);
@@ -254,15 +255,15 @@ fn force(beam: u32) {
         }
         touches = true;
         let normal = offset * (1.0 / distance);
-        let nodes = ends_of(beam, st.x);
-        let others = ends_of(other, st.y);
+        let nodes = line_nodes(beam, st.x);
+        let others = line_nodes(other, st.y);
         var motion = vec3<f32>(0.0);
         var inverse_mass = 0.0;
-        for (var i = 0u; i < 2u; i++) {
+        for (var i = 0u; i < 4u; i++) {
             motion = velocity_at(nodes.nodes[i]) * nodes.weights[i] + motion;
             inverse_mass = inverse_mass + nodes.weights[i] * nodes.weights[i] / mass[nodes.nodes[i]];
         }
-        for (var i = 0u; i < 2u; i++) {
+        for (var i = 0u; i < 4u; i++) {
             motion = velocity_at(others.nodes[i]) * -others.weights[i] + motion;
             inverse_mass = inverse_mass + others.weights[i] * others.weights[i] / mass[others.nodes[i]];
         }
@@ -294,8 +295,9 @@ fn force(beam: u32) {
         add_virial(beam, push, rest);
 #endif
         add_pair(push, nodes, others);
-        add_stiffness(pressed.row_sum, nodes);
-        add_stiffness(pressed.row_sum, others);
+        let row_sum = 0.5 * pressed.row_sum * (line_weights(beam) + line_weights(other));
+        add_stiffness(row_sum, nodes);
+        add_stiffness(row_sum, others);
         raise(PENETRATION + 2u, depth);
     }
     sums[SUMS * beam + SUM_ENERGY] = energy;

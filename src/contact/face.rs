@@ -171,13 +171,54 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
         let mut best = found;
         for step in 1..ring {
             let place = Place { ring: (found.0.ring + step).rem_euclid(ring), ..found.0 };
-            let corners = self.corners(slave, body, image, place);
-            let point = closest(&corners.current);
-            if !point.is_behind() && point.better_than(&best.2) {
-                best = (place, corners, point);
-            }
+            best = self.closer(best, slave, body, image, place);
         }
         best
+    }
+
+    /// The closest face of one where a walk has ended and those beside it that rise above it: in front of a fold each of its
+    /// sides may be where a walk ends.
+    #[inline(always)]
+    pub fn beside(
+        &self,
+        slave: usize,
+        body: usize,
+        image: [i32; 2],
+        found: (Place, Corners<R>, Closest<R>),
+    ) -> (Place, Corners<R>, Closest<R>) {
+        let ring = self.bodies[body].ring as i32;
+        let place = found.0;
+        let mut best = found;
+        for step in [-1, 1] {
+            for k in 1..=RING_REACH {
+                let next = Place { ring: place.ring + k * step, ..place };
+                if k == 1 && !self.rises(slave, body, image, place, next, &found.2) {
+                    break;
+                }
+                best = self.closer(best, slave, body, image, next);
+            }
+            let next = Place { slice: place.slice + step, ..place };
+            if self.has_slice(body, next.slice) && self.rises(slave, body, image, place, next, &found.2) {
+                best = self.closer(best, slave, body, image, next);
+            }
+        }
+        best.0.ring = best.0.ring.rem_euclid(ring);
+        best
+    }
+
+    /// A face instead of another one if it is closer and not seen from behind.
+    #[inline(always)]
+    fn closer(
+        &self,
+        best: (Place, Corners<R>, Closest<R>),
+        slave: usize,
+        body: usize,
+        image: [i32; 2],
+        place: Place,
+    ) -> (Place, Corners<R>, Closest<R>) {
+        let corners = self.corners(slave, body, image, place);
+        let point = closest(&corners.current);
+        if !point.is_behind() && point.better_than(&best.2) { (place, corners, point) } else { best }
     }
 }
 
@@ -398,7 +439,7 @@ impl<R: Real> Closest<R> {
 
     /// Whether the slave is behind the inside of the face.
     #[inline(always)]
-    fn is_behind(&self) -> bool {
+    pub fn is_behind(&self) -> bool {
         self.interior && self.height() < R::from_f64(0.0)
     }
 

@@ -4,6 +4,7 @@
 //! Cells are taken in the pulled-back plane F̄⁻¹x, where the periodic cell keeps its rectangle; a distance ρ in space is at
 //! most ρ |row of F̄⁻¹| along an axis there. A cell lists its items in any order: what is chosen from them does not depend on it.
 
+use super::bow::Bows;
 use super::face::{Place, Surface};
 use super::{Params, status};
 use crate::elements::beam2;
@@ -12,6 +13,7 @@ use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::QUANTUM;
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, Own, Scatter};
+use crate::kernel::vector::add;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -34,6 +36,9 @@ pub const RING_LINES: usize = 5;
 /// Of beams, where those of slabs are.
 pub const ENDS: usize = 3;
 pub const BEAMS: usize = 4;
+/// See [`super::bow`].
+pub const NEIGHBOURS: usize = 5;
+pub const SHARES: usize = 6;
 
 /// Empties the cells.
 pub struct Clear;
@@ -232,16 +237,19 @@ impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let mut grid = Grid::new::<PERIODIC>(io, 5);
+        let mut grid = Grid::new::<PERIODIC>(io, 7);
         let inverse = grid.inverse;
         let displacement = Displacements::new(io, QUANTA, REMAINDER);
         let (ends, beams) = (io.uints(ENDS), io.scalars(BEAMS));
+        let bows = Bows { neighbours: io.uints(NEIGHBOURS), shares: io.scalars(SHARES) };
         let reach = L::Scalar::from_f64(f64::from(2.0 * grid.params.thread_radius + grid.params.skin));
         for item in items {
             let beam = item - grid.params.slabs as usize;
             let (d, change) = beam2::vector::<_, PERIODIC>(beams, ends, beam, &displacement, &io.row.gradient);
+            let bow = bows.bow::<PERIODIC>(beams, ends, beam, &displacement, &io.row.gradient).1;
             let mut bounds = Bounds::new();
-            bounds.grow(&inverse, [d[0] + change[0], d[1] + change[1], d[2] + change[2]]);
+            bounds.grow(&inverse, bow);
+            bounds.grow(&inverse, add(bow, add(d, change)));
             grid.put::<PERIODIC>(io, item, ends[2 * beam] as usize, bounds, reach);
         }
     }

@@ -4,9 +4,10 @@
 //!
 //! `grid` sorts slabs of yarns and beams into cells, `candidates` finds for each slave which bodies are near and at which
 //! face, and every step `penalty` walks from the last face to the closest one, over a surface that is a grid of
-//! rings and slices. `threads` does the same for pairs of beams. Forces and contact stiffness are added as integers, so
+//! rings and slices. `threads` does the same for pairs of beams, whose lines `bow` lays. Forces and contact stiffness are added as integers, so
 //! their sum does not depend on the order, and the forces of a pair cancel exactly.
 
+pub mod bow;
 pub mod candidates;
 pub mod face;
 pub mod friction;

@@ -170,6 +170,9 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                 if THREAD && open && surface.is_rim(body, found.0, &found.2) {
                     found = surface.around(slave, body, image, found);
                 }
+                if THREAD && found.2.distance >= radius && !found.2.is_behind() {
+                    found = surface.beside(slave, body, image, found);
+                }
                 let (place, corners, point) = found;
                 (at[1], at[2]) = (place.ring as u32, place.slice as u32);
                 let moves = io.row.approach < constant(AT_REST);

@@ -1,8 +1,10 @@
-//! Contact of beams with beams: closest points of two segments, penalty and friction as for faces.
+//! Contact of beams with beams: closest points of two segments, the beams' lines (see [`super::bow`]), penalty and friction as
+//! for faces.
 //!
 //! Every pair within reach counts, also where two beams of a thread are near with their common end: the distance of each
 //! pair is continuous, so the energy is, and nothing is gained as a contact passes from beam to beam.
 
+use super::bow::Bows;
 use super::friction::slide;
 use super::grid::{BOX, absolute, cell_index, cells, inverse, pull_back};
 use super::penalty::{Press, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, press, virial};
@@ -27,6 +29,9 @@ pub const BEAMS: usize = 1;
 pub const REFERENCE: usize = 2;
 pub const QUANTA: usize = 3;
 pub const REMAINDER: usize = 4;
+/// See [`super::bow`].
+pub const NEIGHBOURS: usize = 5;
+pub const SHARES: usize = 6;
 
 /// Finds pairs of beams.
 pub struct Pairs<const PERIODIC: bool>;
@@ -37,6 +42,7 @@ pub struct Force<const FRICTION: bool, const PERIODIC: bool>;
 struct Scene<'a, R, const PERIODIC: bool> {
     ends: &'a [u32],
     beams: &'a [R],
+    bows: Bows<'a, R>,
     reference: Lattice<'a>,
     displacement: Displacements<'a, R>,
     gradient: &'a [[R; 3]; 3],
@@ -49,6 +55,7 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
         Self {
             ends: io.uints(ENDS),
             beams: io.scalars(BEAMS),
+            bows: Bows { neighbours: io.uints(NEIGHBOURS), shares: io.scalars(SHARES) },
             reference: Lattice::new(io, REFERENCE),
             displacement: Displacements::new(io, QUANTA, REMAINDER),
             gradient: &io.row.gradient,
@@ -63,14 +70,22 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
         (d, add(d, change))
     }
 
-    /// From the first node of `a` to the first node of `b` in an image, in the reference and now.
+    /// From a beam's chord to its line, in the reference and now.
     #[inline(always)]
-    fn between(&self, a: usize, b: usize, image: [i32; 2]) -> (Vector<R>, Vector<R>) {
+    fn bow(&self, beam: usize) -> (Vector<R>, Vector<R>) {
+        self.bows.bow::<PERIODIC>(self.beams, self.ends, beam, &self.displacement, self.gradient)
+    }
+
+    /// From the line of beam `a`, which lies `bow` beside its chord, to that of `b` in an image, in the reference and now.
+    #[inline(always)]
+    fn between(&self, a: usize, bow: &(Vector<R>, Vector<R>), b: usize, image: [i32; 2]) -> (Vector<R>, Vector<R>) {
+        let other = self.bow(b);
         let (a, b) = (self.ends[2 * a] as usize, self.ends[2 * b] as usize);
         let shift = if PERIODIC { [0, 1].map(|k| image[k].wrapping_mul(self.period[k])) } else { [0; 2] };
         let rest: Vector<R> = self.reference.between(b, a, shift);
         let affine = if PERIODIC { add(rest, apply(self.gradient, rest)) } else { rest };
-        (rest, add(affine, self.displacement.between(b, a)))
+        let now = add(affine, self.displacement.between(b, a));
+        (add(rest, sub(other.0, bow.0)), add(now, sub(other.1, bow.1)))
     }
 }
 
@@ -106,12 +121,12 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         // thread of each beam, and see `ARC`
-        const THREADS: usize = 5;
-        const ARCS: usize = 6;
-        const COUNTS: usize = 7;
-        const ITEMS: usize = 8;
+        const THREADS: usize = 7;
+        const ARCS: usize = 8;
+        const COUNTS: usize = 9;
+        const ITEMS: usize = 10;
         // only in periodic scenes; else all writes are one number earlier
-        const BOXES: usize = 9;
+        const BOXES: usize = 11;
         let missing = usize::from(!PERIODIC);
         let params: Params = io.params();
         let constant = L::Scalar::from_f64;
@@ -119,9 +134,9 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
         let (threads, arcs) = (io.uints(THREADS), io.scalars(ARCS));
         let (counts, lists) = (io.uints(COUNTS), io.uints(ITEMS));
         let boxes = if PERIODIC { io.scalars(BOXES) } else { &[] };
-        let mut keys = io.own::<u32>(10 - missing);
-        let mut states = io.own::<L::Scalar>(11 - missing);
-        let flags = io.atomic_uints(12 - missing);
+        let mut keys = io.own::<u32>(12 - missing);
+        let mut states = io.own::<L::Scalar>(13 - missing);
+        let flags = io.atomic_uints(14 - missing);
         let inverse = inverse::<_, PERIODIC>(&io.row.gradient);
         let period = params.period.map(|p| L::Scalar::from_i32(p) * constant(QUANTUM));
         let reach = constant(f64::from(2.0 * params.thread_radius + params.skin));
@@ -132,8 +147,10 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
             let mut count = 0;
             let middle = |item: usize, k: usize| boxes[BOX * item + k];
             let (_, along) = scene.vector(beam);
-            let (start, _) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, scene.ends[2 * beam] as usize);
-            let back = pull_back(&inverse, along);
+            let bow = scene.bow(beam);
+            let (node, _) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, scene.ends[2 * beam] as usize);
+            let (aside, back) = (pull_back(&inverse, bow.1), pull_back(&inverse, along));
+            let start = [node[0] + aside[0], node[1] + aside[1]];
             let range = |k: usize| {
                 let end = start[k] + back[k];
                 cells::<_, PERIODIC>(&params, k, start[k].min(end), start[k].max(end))
@@ -167,7 +184,7 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
                             let apart = middle(params.slabs as usize + beam, k) - middle(near as usize, k);
                             (apart / period[k]).to_i32()
                         });
-                        let (_, apart) = scene.between(beam, other, image);
+                        let (_, apart) = scene.between(beam, &bow, other, image);
                         let (_, direction) = scene.vector(other);
                         let (s, t) = closest_points(along, direction, apart);
                         let offset = sub(scale(along, s), fma(direction, t, apart));
@@ -218,8 +235,8 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        const VELOCITY: usize = 5;
-        const MASS: usize = 6;
+        const VELOCITY: usize = 7;
+        const MASS: usize = 8;
         let (state_size, virial) = const { (slot_state(FRICTION), virial(FRICTION)) };
         let params: Params = io.params();
         let real = |x: f32| L::Scalar::from_f64(f64::from(x));
@@ -228,10 +245,10 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
         let scene = Scene::<_, PERIODIC>::new(io, params.period);
         let velocity = Field::new(io, VELOCITY);
         let mass = io.scalars(MASS);
-        let mut keys = io.own::<u32>(7);
-        let mut states = io.own::<L::Scalar>(8);
-        let mut sums = io.own::<L::Scalar>(9);
-        let (forces, stiffness, flags) = (io.atomics(10), io.atomics(11), io.atomic_uints(12));
+        let mut keys = io.own::<u32>(9);
+        let mut states = io.own::<L::Scalar>(10);
+        let mut sums = io.own::<L::Scalar>(11);
+        let (forces, stiffness, flags) = (io.atomics(12), io.atomics(13), io.atomic_uints(14));
         let radius = real(params.thread_radius) * io.row.radius;
         let elapsed = io.row.dt_mid + io.row.dt_mid - io.row.dt;
         for beam in items {
@@ -244,10 +261,10 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
             let mut energy = zero;
             let mut touches = false;
             let (rest, along) = scene.vector(beam);
-            let own = [scene.ends[2 * beam] as usize, scene.ends[2 * beam + 1] as usize];
+            let bow = scene.bow(beam);
             for (slot, key) in slot_keys.iter().enumerate().take_while(|(_, key)| **key != EMPTY) {
                 let (other, image) = of_key(*key);
-                let (apart_rest, apart) = scene.between(beam, other, image);
+                let (apart_rest, apart) = scene.between(beam, &bow, other, image);
                 let (direction_rest, direction) = scene.vector(other);
                 let (s, t) = closest_points(along, direction, apart);
                 let offset = sub(scale(along, s), fma(direction, t, apart));
@@ -266,9 +283,8 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
                 }
                 touches = true;
                 let normal = scale(offset, one / distance);
-                let theirs = [scene.ends[2 * other] as usize, scene.ends[2 * other + 1] as usize];
-                let nodes = [(own[0], one - s), (own[1], s)];
-                let others = [(theirs[0], one - t), (theirs[1], t)];
+                let nodes = scene.bows.line_nodes(scene.ends, beam, s);
+                let others = scene.bows.line_nodes(scene.ends, other, t);
                 let mut motion = [zero; 3];
                 let mut inverse = zero;
                 for (node, weight) in nodes {
@@ -307,6 +323,8 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
                     add_virial(&mut sum[virial..], force, between);
                 }
                 add_pair(forces, flags, force, real(params.force_quantum), nodes, others);
+                let weights = scene.bows.line_weights(beam) + scene.bows.line_weights(other);
+                let row_sum = constant(0.5) * row_sum * weights;
                 add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes.into_iter().chain(others));
                 raise(&flags[status::PENETRATION[2]], depth);
             }

@@ -87,11 +87,15 @@ impl ContactScene<'_> {
             let search = Search { counts, lists, boxes };
             b.plan.search.push(after::<grid::Clear>("clear grid", cells, 4096, &[], &[(counts, own(1, 1))], params));
             let tables = (slabs > 0).then(|| self.slabs(b, &search, &surfaces, params));
-            if paired > 0 {
-                self.beams_to_grid(b, &search, slabs, paired, params);
+            let bows = (paired > 0).then(|| {
+                let neighbours = b.indices("neighbours of beams", self.threads.neighbours.clone());
+                [neighbours, b.table("shares in bows", self.threads.shares.clone())]
+            });
+            if let Some(bows) = bows {
+                self.beams_to_grid(b, &search, slabs, bows, params);
             }
             faces = tables.map(|tables| self.faces(b, &search, &tables, &surfaces, sums, params));
-            pairs = (paired > 0).then(|| self.pairs(b, &search, sums, params));
+            pairs = bows.map(|bows| self.pairs(b, &search, bows, sums, params));
         }
         let ties = self.active.ties.then(|| self.tied(b, sums, params));
         let slaves = surfaces
@@ -132,8 +136,9 @@ impl ContactScene<'_> {
     }
 
     /// Threads in the grid, behind the slabs of yarns.
-    fn beams_to_grid(&self, b: &mut Builder, search: &Search, slabs: usize, beams: usize, params: Params) {
-        let reads = [&self.place()[..], &[self.ends, self.beams]].concat();
+    fn beams_to_grid(&self, b: &mut Builder, search: &Search, slabs: usize, bows: [Buffer; 2], params: Params) {
+        let beams = self.threads.thread.len();
+        let reads = [&self.place()[..], &[self.ends, self.beams], &bows].concat();
         let kernel = flagged!(grid::FillBeams; self.active.periodic);
         let stage = coded(kernel, "threads to grid", beams, 32, &reads, &self.to_grid(search), params);
         // what fills the grid may run side by side
@@ -200,6 +205,7 @@ impl ContactScene<'_> {
         &self,
         b: &mut Builder,
         search: &Search,
+        bows: [Buffer; 2],
         (force, stiffness): (Buffer, Buffer),
         params: Params,
     ) -> ContactBuffers {
@@ -210,7 +216,7 @@ impl ContactScene<'_> {
         let keys = b.add("beam pairs", Kind::Uint, slots * beams, true, Initial::Uint(vec![EMPTY; slots * beams]));
         let state = b.add("beam pair state", Kind::Scalar, size * slots * beams, true, Initial::Zero);
         let sums = b.scratch("beam pair sums", penalty::sums(friction, periodic) * beams);
-        let common = [&[self.ends, self.beams][..], &self.place()].concat();
+        let common = [&[self.ends, self.beams][..], &self.place(), &bows].concat();
         let mut reads = [&common[..], &[of, arcs, search.counts, search.lists]].concat();
         reads.extend(periodic.then_some(search.boxes));
         let keys_own = (keys, own(1, slots));

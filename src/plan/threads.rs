@@ -5,6 +5,7 @@
 //! cell 0.24 % short of thread, and too tight. Since beams know chords L₀, the table holds EA L₀/s, and the
 //! thermal strain is ε_th s/L₀ + s/L₀ − 1. Threads start at rest as generated, and those that nothing tightens stay so.
 
+use crate::contact::bow;
 use crate::dynamics::assemble::{BENT, NONE, THREAD};
 use crate::elements::beam2::TABLE;
 use crate::elements::bend::smoothed;
@@ -36,6 +37,9 @@ pub struct Threads {
     pub bend_rows: Vec<f64>,
     /// Thread of each beam.
     pub thread: Vec<u32>,
+    /// See [`crate::contact::bow`].
+    pub neighbours: Vec<u32>,
+    pub shares: Vec<f64>,
     /// See [`crate::contact::threads::ARC`].
     pub arcs: Vec<f64>,
     /// Radius of each thread node, mm.
@@ -85,7 +89,15 @@ impl Threads {
                 t.slots[THREAD * (a.node - first)] = (base + i) as u32;
                 t.slots[THREAD * (b.node - first) + 1] = (base + i) as u32;
             }
-            if thread.wrap.is_some() {
+            let closed = thread.wrap.is_some();
+            for i in 0..count {
+                let inner = closed || (i > 0 && i + 1 < count);
+                let beside = if inner { [(i + count - 1) % count, (i + 1) % count] } else { [i; 2] };
+                t.neighbours.extend(beside.map(|at| (base + at) as u32));
+                let [before, behind] = beside.map(|at| lengths[at]);
+                t.shares.extend(if inner { bow::shares(before, lengths[i], behind) } else { [0.0; 2] });
+            }
+            if closed {
                 for beam in base..base + count {
                     t.arcs[3 * beam + 2] = arc;
                 }
@@ -93,7 +105,7 @@ impl Threads {
             if !bending || thread.bending == 0.0 {
                 continue;
             }
-            let bends = if thread.wrap.is_some() { count } else { count - 1 };
+            let bends = if closed { count } else { count - 1 };
             for i in 0..bends {
                 let pair = [base + i, base + (i + 1) % count];
                 let bend = t.pairs.len() / 2;
