@@ -60,19 +60,20 @@ fn the_measured_limit_of_a_chain_is_exact() {
 /// Slices that are thin or sheared, fibres that are tight, and yarns that buckle are what the fibre lines do not help with.
 #[test]
 fn the_estimate_holds_for_elements() {
-    for (name, times) in [
-        ("sliver_elements", &[0.0][..]),
-        ("sliver_elements_on_fibre_lines", &[0.0]),
-        ("distorted_hexahedra", &[0.0, 5e-5]),
-        ("fibre_compression", &[0.0, 3e-4, 2e-3]),
-        ("free_expansion", &[0.0]),
+    for (name, times, share) in [
+        ("sliver_elements", &[0.0][..], 0.35),
+        ("sliver_elements_on_fibre_lines", &[0.0], 0.35),
+        ("distorted_hexahedra", &[0.0, 5e-5], 0.35),
+        ("fibre_compression", &[0.0, 3e-4, 2e-3], 0.35),
+        // all of its nodes touch a plate and are as heavy as any step asks: there is no limit
+        ("free_expansion", &[0.0], 0.0),
     ] {
         let mut loaded = read(Path::new(&format!("cases/hard/{name}.json")), &[]).unwrap();
         loaded.case.integration.precision = F64;
         let mut scene = run::simulation(&loaded, Make { precision: F64, ..Make::default() }).unwrap();
         for &time in times {
             advance(&mut scene, time);
-            check(&format!("{name} at {time:e} s"), &mut scene, 0.35);
+            check(&format!("{name} at {time:e} s"), &mut scene, share);
         }
     }
     let yarn = block("yarn", [6, 3, 2], [[0.0, -0.5, -0.2], [2.0, 0.5, 0.2]], 1.8e-9, charmetant());
@@ -121,10 +122,12 @@ fn the_estimate_holds_for_a_cell_with_contact_and_stick() {
     let mut cell = start(&coarse_cell(), F64);
     advance(&mut cell, 0.0);
     check("cell at rest", &mut cell, 0.4);
-    advance(&mut cell, 1.5e-4);
-    check("cell tightened", &mut cell, 0.4);
-    advance(&mut cell, 2.5e-4);
-    check("cell sheared", &mut cell, 0.4);
+    // contacts begin and end all the time; none of that may count as stiffness
+    for i in 0..=12 {
+        let time = 1.5e-4 + 1e-4 * f64::from(i) / 12.0;
+        advance(&mut cell, time);
+        check(&format!("cell after {time:.3e} s"), &mut cell, 0.5);
+    }
 }
 
 /// Nodes whose elements would call for shorter steps are made heavier, and no heavier than that takes.

@@ -96,6 +96,8 @@ pub struct Buffers {
     pub acceleration: Buffer,
     pub inverse_mass: Buffer,
     pub correction: Option<Buffer>,
+    /// What contact-aware mass adds, tonne.
+    pub added_mass: Option<Buffer>,
     pub status: Buffer,
     pub hex_energy: Option<Buffer>,
     pub beam_tension: Option<Buffer>,
@@ -485,6 +487,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             acceleration,
             inverse_mass,
             correction,
+            added_mass,
             status: status_,
             hex_energy: hex.energy,
             beam_tension,

@@ -1,6 +1,8 @@
 //! The limit of the time step as it is: 2/ω of the fastest oscillation of the whole scene about its present state, by power
 //! iteration. Stiffness comes from differences of all forces, with every contact held by friction; the mass matrix is the one
 //! that acts, with fibre lines and contact-aware mass. Both of these grow with the step, so the limit is the step that is its own limit.
+//! A contact that is just beginning adds mass on one side of the present state only. Forces there are not zero, and divided by two
+//! masses they would differ without any stiffness: both sides have the mass of both.
 
 use super::Simulation;
 use crate::case::steps::Precision;
@@ -52,6 +54,8 @@ struct Oscillation<'a> {
     motion: Vec<f64>,
     /// A times the motion.
     inertia: Vec<f64>,
+    /// Mass that contact has added on either side so far, tonne; none without contact-aware mass.
+    added: Vec<f64>,
     seed: u64,
 }
 
@@ -68,7 +72,11 @@ impl Simulation {
         }
         // without friction there are no buffers for it
         let friction = if self.friction > 0.0 { STICK } else { 0.0 };
-        let stuck = plan::build(&self.case, friction, &self.mesh, self.capacity)?.plan;
+        let mut case = self.case.clone();
+        if let Some(contact_mass) = &mut case.effects.contact_mass {
+            contact_mass.memory = 1.0;
+        }
+        let stuck = plan::build(&case, friction, &self.mesh, self.capacity)?.plan;
         let names = |plan: &Plan| plan.buffers.iter().map(|b| (b.name, b.len)).collect::<Vec<_>>();
         assert_eq!(names(&stuck), names(&self.model.plan), "its stages run on the buffers of this scene");
         let mut stages = stuck.step;
@@ -101,6 +109,7 @@ impl Simulation {
         let mut oscillation = Oscillation {
             motion: vec![0.0; 3 * nodes],
             inertia: Vec::new(),
+            added: Vec::new(),
             scene: self,
             stages,
             row,
@@ -133,6 +142,8 @@ impl Oscillation<'_> {
     /// 2/ω of the fastest oscillation with the mass that a step of `dt` calls for; infinite if a scene buckles faster than it swings.
     fn limit(&mut self, dt: f64) -> f64 {
         (self.row.dt, self.row.dt_mid) = (dt, 0.5 * (dt + SLOWLY));
+        self.scene.backend.restore();
+        self.added = self.scene.model.buffers.added_mass.map_or(Vec::new(), |b| self.scene.backend.scalars(b));
         self.stir();
         let (mut best, mut since) = (0.0, 0);
         for round in 0..MOST_ROUNDS {
@@ -167,7 +178,13 @@ impl Oscillation<'_> {
 
     /// K times the motion, and A⁻¹K times the motion.
     fn respond(&mut self) -> (Vec<f64>, Vec<f64>) {
-        let sides = [1.0, -1.0].map(|side| self.forces(side * REACH));
+        let sides = loop {
+            let before = self.added.clone();
+            let sides = [1.0, -1.0].map(|side| self.forces(side * REACH));
+            if self.added == before {
+                break sides;
+            }
+        };
         let slope = |i: usize, of: fn(&[Vec<f64>; 2]) -> &Vec<f64>| {
             (of(&sides[1])[i] - of(&sides[0])[i]) / (2.0 * REACH) * f64::from(u8::from(self.free[i]))
         };
@@ -184,7 +201,13 @@ impl Oscillation<'_> {
         backend.clear(b.quanta);
         backend.set_scalars(b.remainder, &moved);
         backend.set_scalars(b.velocity, &velocity);
+        if let Some(added) = b.added_mass {
+            backend.set_scalars(added, &self.added);
+        }
         backend.run(&self.stages, &[self.row]);
+        if let Some(added) = b.added_mass {
+            self.added = backend.scalars(added);
+        }
         let mut acceleration = backend.scalars(b.acceleration);
         let inverse = backend.scalars(b.inverse_mass);
         let force = acceleration.iter().zip(inverse.iter().cycle()).map(|(a, m)| if *m > 0.0 { a / m } else { 0.0 });
