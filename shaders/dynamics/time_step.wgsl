@@ -24,9 +24,15 @@ struct Params {
 @group(1) @binding(9) var<storage, read> bend_energy: array<f32>;
 @group(1) @binding(10) var<storage, read> bend_force: array<f32>;
 @group(1) @binding(11) var<storage, read> bend_rows: array<f32>;
-@group(1) @binding(12) var<storage, read_write> limit: array<f32>;
+const ADDED_MASS: u32 = 12u;
 #else
-@group(1) @binding(7) var<storage, read_write> limit: array<f32>;
+const ADDED_MASS: u32 = 7u;
+#endif
+#if MASS_ADDED
+@group(1) @binding(ADDED_MASS) var<storage, read> added_mass: array<f32>;
+@group(1) @binding(ADDED_MASS + 1u) var<storage, read_write> limit: array<f32>;
+#else
+@group(1) @binding(ADDED_MASS) var<storage, read_write> limit: array<f32>;
 #endif
 
 // Numbers of a beam in the table; its length at rest is the fourth.
@@ -82,7 +88,12 @@ fn element_limit(node: u32) {
 #endif
     }
     limit[node] = k;
-    limit[node + arrayLength(&mass)] = k / max(mass[node], k * params.mass_per_stiffness);
+#if MASS_ADDED
+    let acting = mass[node] + added_mass[node];
+#else
+    let acting = mass[node];
+#endif
+    limit[node + arrayLength(&mass)] = k / max(acting, k * params.mass_per_stiffness);
 }
 #endif
 

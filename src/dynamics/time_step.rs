@@ -10,6 +10,9 @@
 //! [`COHERENT`] is kept: measured by power iteration, the sheared cell, yarns that are twisted or spread evenly, and one that buckles
 //! need 0.07 to 0.32.
 //!
+//! Mass that contact has added counts: it goes slower than the limit is looked at again. What contact itself calls for is covered by
+//! it, see [`super::assemble`].
+//!
 //! A bend of energy S (T − T₀)², T = tan(θ/2), is (1 + T²)(1 + T² + 2 T (T − T₀)) times as stiff as one that is straight. T comes
 //! from its force on a beam of length l, S (T − T₀)(1 + T²)/l, and its energy.
 
@@ -53,8 +56,8 @@ pub const BEND_FORCE: usize = 10;
 pub const BEND_ROWS: usize = 11;
 /// Numbers of a bend's row sums: of its three nodes while it is straight, N/mm; length of its first beam, mm.
 pub const ROWS: usize = 4;
-/// Row sum of element stiffness, N/mm, and R/m, 1/s² (2 planes); without `BENDING` it takes the place of its slots.
-const LIMIT: usize = 12;
+/// Added mass, tonne, only with `MASS_ADDED`; without `BENDING` it takes the place of its slots.
+const ADDED_MASS: usize = 12;
 
 /// Share of the part across of fibres that is kept.
 pub const COHERENT: f64 = 0.375;
@@ -79,8 +82,8 @@ fn stiffening<R: Real>([stiffness, rest]: [R; 2], energy: R, force: R, length: R
     square * (square + (t + t) * further)
 }
 
-/// Assembles the row sums of element stiffness, with those of bends.
-pub struct ElementLimit<const BENDING: bool>;
+/// Assembles the row sums of element stiffness, with those of bends: N/mm, and R/m, 1/s² (2 planes).
+pub struct ElementLimit<const BENDING: bool, const MASS_ADDED: bool>;
 /// What bends say of their stiffness.
 #[derive(Clone, Copy)]
 struct Bends<'a, R> {
@@ -94,9 +97,11 @@ struct Bends<'a, R> {
 /// Leaves out nodes that are held altogether: they do not swing.
 pub struct HeldLimit;
 
-impl<const BENDING: bool> Kernel for ElementLimit<BENDING> {
-    const SHADER: Shader =
-        Shader { defines: &[when(BENDING, "BENDING")], ..Shader::new("dynamics/time_step", "element_limit") };
+impl<const BENDING: bool, const MASS_ADDED: bool> Kernel for ElementLimit<BENDING, MASS_ADDED> {
+    const SHADER: Shader = Shader {
+        defines: &[when(BENDING, "BENDING"), when(MASS_ADDED, "MASS_ADDED")],
+        ..Shader::new("dynamics/time_step", "element_limit")
+    };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -113,7 +118,9 @@ impl<const BENDING: bool> Kernel for ElementLimit<BENDING> {
             rows: io.scalars(BEND_ROWS),
         });
         let size = |force: &[L::Scalar]| norm([force[0], force[1], force[2]]);
-        let mut limits = io.own::<L::Scalar>(if BENDING { LIMIT } else { BEND_SLOTS });
+        let added_at = if BENDING { ADDED_MASS } else { BEND_SLOTS };
+        let added = MASS_ADDED.then(|| io.scalars(added_at));
+        let mut limits = io.own::<L::Scalar>(added_at + usize::from(MASS_ADDED));
         debug_assert!(bounds.len() % LANES == 0);
         let two = L::Scalar::from_f64(2.0);
         for node in items {
@@ -140,7 +147,8 @@ impl<const BENDING: bool> Kernel for ElementLimit<BENDING> {
                 }
             }
             *limits.at(0, node) = k;
-            *limits.at(1, node) = k / masses[node].max(k * least);
+            let mass = added.map_or(masses[node], |added| masses[node] + added[node]);
+            *limits.at(1, node) = k / mass.max(k * least);
         }
     }
 }

@@ -425,9 +425,10 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         let rows = b.table("bend rows", threads.bend_rows.clone());
         reads.extend([bent.slots, bent.table, bent.energy, bent.force, rows]);
     }
+    reads.extend(added_mass);
     let params = time_step::Params { first_thread, mass_per_stiffness: assemble_params.mass_per_stiffness };
     let writes = [(element_limit, own(2, 1))];
-    let kernel = flagged!(ElementLimit; active.bending);
+    let kernel = flagged!(ElementLimit; active.bending, active.contact_mass);
     b.plan.diagnose.push(waiting(coded(kernel, "element limit", nodes, NODE_GRAIN, &reads, &writes, params)));
     if let Some((at, count)) = condition_nodes {
         let writes = [(element_limit, Access::Scatter)];
