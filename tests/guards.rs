@@ -114,3 +114,17 @@ fn more_bodies_in_one_place_than_tables_can_hold() {
     let guard = stopped(&mut start(&scene(json!(blocks), json!({}), json!({})), F32), 1e-3);
     assert_eq!(guard.cause, "contact overflow");
 }
+
+#[test]
+fn a_contact_force_that_no_integer_holds() {
+    let mut thrown = cube("thrown", [0.1, 0.2, 0.999]);
+    thrown["velocity_mm_s"] = json!([0, 0, -1e7]);
+    let integration = json!({ "dt_s": 1e-10, "energy_tolerance": 100, "penetration_tolerance": 100 });
+    let case = scene(json!([cube("target", [0.0; 3]), thrown]), json!({}), integration);
+    let case = with(case, &[("/steps", json!([{ "hold": { "time_s": 1e-6 } }]))]);
+    for precision in [F64, F32] {
+        let guard = stopped(&mut start(&case, precision), 1e-6);
+        assert_eq!(guard.cause, "force range");
+        assert!(guard.culprit.contains("(target)") || guard.culprit.contains("(thrown)"), "{guard}");
+    }
+}

@@ -8,7 +8,7 @@ use crate::kernel::buffer::Buffer;
 use crate::kernel::position::MOST_MM;
 
 /// A step that is longer than the estimated limit by this factor is taken for unstable: the estimate is a bound from below, and
-/// measured limits were up to 2.5 times as large.
+/// measured limits were up to 2.9 times as large.
 const SURELY_UNSTABLE: f64 = 3.0;
 
 impl Simulation {

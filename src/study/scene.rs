@@ -48,7 +48,8 @@ pub struct Scenes {
     make: Make,
     /// Steps after which a scene is left.
     longest: u64,
-    seen: BTreeMap<PathBuf, Observed>,
+    /// By case and overrides.
+    seen: BTreeMap<(PathBuf, Vec<String>), Observed>,
 }
 
 impl Scenes {
@@ -69,11 +70,12 @@ impl Scenes {
         let loaded = read(path, overrides)?;
         let mut case = loaded.clone();
         case.case.integration.precision = self.make.precision;
-        let observed = match self.seen.get(path) {
+        let key = (path.to_path_buf(), overrides.to_vec());
+        let observed = match self.seen.get(&key) {
             Some(observed) => observed.clone(),
             None => observe(run::simulation(&case, self.make.clone())?, self.longest)?,
         };
-        self.seen.insert(path.to_path_buf(), observed.clone());
+        self.seen.insert(key, observed.clone());
         let Some(expect) = &loaded.case.expect else { return Ok((observed, Vec::new())) };
         let mut broken = observed.broken(expect);
         if let Some(same) = &expect.same_as {

@@ -91,10 +91,15 @@ impl Report<'_> {
 
     fn json(&self) -> Value {
         let f = self.findings;
-        let differences = |list: &[Option<Difference>]| {
-            let named = f.measures.iter().zip(list);
-            let value = |d: &Option<Difference>| d.map(|d| json!({ "l2": d.l2, "rms": d.rms }));
-            named.map(|(m, d)| (m.name.to_owned(), json!(value(d)))).collect::<serde_json::Map<_, _>>()
+        // a difference that chance alone may make is only known to be below that
+        let differences = |list: &[Option<Difference>], claim: &dyn Fn(usize) -> Option<(f64, bool)>| {
+            let value = |(k, d): (usize, &Option<Difference>)| match (d, claim(k)) {
+                (Some(_), Some((chance, false))) => json!({ "below": chance }),
+                (Some(d), _) => json!({ "l2": d.l2, "rms": d.rms }),
+                (None, _) => Value::Null,
+            };
+            let named = f.measures.iter().zip(list.iter().enumerate().map(value));
+            named.map(|(m, value)| (m.name.to_owned(), value)).collect::<serde_json::Map<_, _>>()
         };
         let row = |(number, row): (usize, &Row)| {
             let mut value = row.ran.json();
@@ -104,8 +109,8 @@ impl Report<'_> {
             value["steps"] = json!(row.number("steps"));
             value["energy_balance_error"] = json!(row.number("worst_energy_balance"));
             value["time_over_default"] = json!(row.time);
-            value["errors"] = json!(differences(&row.errors));
-            value["changes"] = json!(differences(&row.changes));
+            value["errors"] = json!(differences(&row.errors, &|k| f.claim(row, k)));
+            value["changes"] = json!(differences(&row.changes, &|k| f.effect(row, k)));
             value["front"] = json!(row.front);
             value
         };
