@@ -10,10 +10,11 @@ use serde_json::{Value, json};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Accuracy {
-    /// A first look: half the columns (`resolution.warp_columns` 9, `resolution.weft_columns` 4) and half the slices
-    /// (`resolution.slice_mm` 0.606).
+    /// A first look: half the columns (`resolution.warp_columns` 9, `resolution.weft_columns` 4), half the slices
+    /// (`resolution.slice_mm` 0.606), and the beams and steps of `engineering`.
     Preview,
-    /// For results: `resolution.finer` 0.7, but with 110 beams in a lap (`resolution.beams_per_lap` 157).
+    /// For results: `resolution.beams_per_lap` 120, and steps up to 1 µs (`integration.dt_max_s` 1e-6) with elements that are
+    /// heavy enough for them (`effects.contact_mass.least_limit_s` 2.3e-6).
     Engineering,
     /// To judge the others by: `resolution.finer` 1.5, `resolution.beams_per_lap` 90, `integration.precision` f64,
     /// `integration.dt_max_s` 2.5e-7.
@@ -24,8 +25,16 @@ impl Accuracy {
     /// The fields of a case that the word stands for.
     pub fn fields(self) -> Value {
         match self {
-            Self::Preview => json!({ "resolution": { "warp_columns": 9, "weft_columns": 4, "slice_mm": 0.606 } }),
-            Self::Engineering => json!({ "resolution": { "finer": 0.7, "beams_per_lap": 157 } }),
+            Self::Preview => {
+                let mut fields = json!({ "resolution": { "warp_columns": 9, "weft_columns": 4, "slice_mm": 0.606 } });
+                fill(&mut fields, &Self::Engineering.fields());
+                fields
+            }
+            Self::Engineering => json!({
+                "resolution": { "beams_per_lap": 120 },
+                "integration": { "dt_max_s": 1e-6 },
+                "effects": { "contact_mass": { "least_limit_s": 2.3e-6 } }
+            }),
             Self::Reference => json!({
                 "resolution": { "finer": 1.5, "beams_per_lap": 90 },
                 "integration": { "precision": "f64", "dt_max_s": 2.5e-7 }
