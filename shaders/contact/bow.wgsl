@@ -1,5 +1,5 @@
-// Where a beam is in contact with other beams: its chord, moved out by the mean height of the arc that it stands for. What includes
-// this binds `neighbours` and `shares`, and what `elements/beam2` asks for.
+// Where a beam is in contact with other beams: its chord, moved out by the mean height of the arc that it stands for.
+// What includes this binds `neighbours` and `shares`, and what `elements/beam2` asks for.
 
 #include "contact/mod"
 #include "elements/beam2"
@@ -24,11 +24,10 @@ fn bow(beam: u32) -> Bow {
 fn line_nodes(beam: u32, s: f32) -> Weighted {
     let p = shares[2u * beam];
     let q = shares[2u * beam + 1u];
-    return Weighted(
-        4u,
-        vec4<u32>(ends[2u * neighbours[2u * beam]], ends[2u * beam], ends[2u * beam + 1u], ends[2u * neighbours[2u * beam + 1u] + 1u]),
-        vec4<f32>(-p, 1.0 - s + p, s + q, -q),
-    );
+    let first = ends[2u * neighbours[2u * beam]];
+    let last = ends[2u * neighbours[2u * beam + 1u] + 1u];
+    let nodes = vec4<u32>(first, ends[2u * beam], ends[2u * beam + 1u], last);
+    return Weighted(4u, nodes, vec4<f32>(-p, 1.0 - s + p, s + q, -q));
 }
 
 // The sum of the sizes of these weights.

@@ -1,10 +1,10 @@
 //! Where a beam is in contact with other beams: its chord, moved out by the mean height of the arc that it stands for.
 //!
 //! A chain of chords that touches a thread inside its bend with the middle of each is a polygon around it: one of angle θ a
-//! chord is θ²/12 longer than the arc. The arc of a chord of length l lies κl²/12 outside of it in the mean, with κ its curvature,
-//! and with chords moved by that much the chain is as long as the arc when it touches. κ comes from the directions of both
-//! neighbours and the lengths between their middles and the beam's. A line has the direction and length of its chord, so
-//! closest points are those of straight segments, and forces on the four nodes are the exact gradient of the energy.
+//! chord is θ²/12 longer than the arc. The arc of a chord of length l lies κl²/12 outside of it in the mean, with κ its
+//! curvature, and with chords moved by that much the chain is as long as the arc when it touches. κ comes from the directions
+//! of both neighbours and the lengths between their middles and the beam's. A line has the direction and length of its chord,
+//! so closest points are those of straight segments, and forces on the four nodes are the exact gradient of the energy.
 
 use crate::elements::beam2;
 use crate::kernel::lane::Real;
