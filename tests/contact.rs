@@ -244,7 +244,7 @@ fn pass(what: &str, slab: Value, nodes: [[f64; 3]; 2], moved: [f64; 3], beyond: 
     let thread =
         json!({ "name": "thread", "nodes": nodes, "radius_mm": radius, "axial_n": 1, "linear_density_tex": 10 });
     let case = with(
-        scene(json!([slab]), json!({ "thread_penalty_n_mm2": penalty, "damping_ratio": 0 })),
+        scene(json!([slab]), json!({ "thread_penalty_n_mm2": penalty, "damping_ratio": 0, "skin_mm": 1.5 })),
         &[
             ("/domain/mesh/threads", json!([thread])),
             (
@@ -305,6 +305,17 @@ fn a_thread_passes_a_thin_end_smoothly() {
     let slab = block("slab", [4, 4, 1], [[-1.0, -1.0, -0.05], [1.0, 1.0, 0.05]], 1e-9, neo_hookean(1000.0, 0.3));
     let nodes = [[1.12, 0.1, 0.3], [1.79, 0.1, 0.3]];
     pass("the thin end", slab, nodes, [0.0, 0.05, -0.6], |x| x[2].abs() < 0.05);
+}
+
+/// In front of a valley either side is where a walk over the surface may end; the ridge beyond it is nearer.
+#[test]
+fn a_thread_passes_a_ridge_behind_a_valley_smoothly() {
+    let slab = shaped("slab", [4, 8, 1], 1e-9, neo_hookean(1000.0, 0.3), |t| {
+        let across = 2.0 * t[1] - 1.0;
+        [2.0 * t[0] - 1.0, across, t[2] * (1.0 - (across.abs() - 0.5).abs()) - 0.5]
+    });
+    let nodes = [[-0.3, -0.1, 0.62], [0.37, -0.1, 0.62]];
+    pass("the ridge", slab, nodes, [0.0, 1.1, 0.0], |x| x[1] > 0.3);
 }
 
 /// Nodes of surfaces and of threads all around a warped face: inside, over its border and behind it.
