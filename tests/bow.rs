@@ -82,7 +82,9 @@ fn a_thread_around_a_thread_is_as_tight_as_its_arc() {
         let angle = PI / beams as f64;
         let excess = PI * 2.0 * RADIUS * angle * angle / 12.0 / (2.0 * LEG + PI * 2.0 * RADIUS);
         println!("{beams} beams: chords would raise it by {:.2}", excess / SHRINKS);
-        near(&format!("{beams} beams: tension over that of the arc"), tension(&even(beams), F64), 1.0, allowed);
+        let ratio = tension(&even(beams), F64);
+        near(&format!("{beams} beams: tension over that of the arc"), ratio, 1.0, allowed);
+        below(&format!("{beams} beams: its error over that of chords"), (ratio - 1.0).abs() * SHRINKS / excess, 0.2);
     }
     let uneven = [0.0, 0.2, 0.45, 0.75, 1.1, 1.4, 1.6, 1.85, 2.2, 2.5, 2.8, 3.0, PI];
     near("uneven beams: tension over that of the arc", tension(&uneven, F64), 1.0, 0.006);
@@ -93,7 +95,7 @@ fn a_thread_around_a_thread_is_as_tight_as_its_arc() {
 fn a_bent_thread_that_is_hit_keeps_momentum_and_energy() {
     // friction acts between middles, and threads do not spin: it does not keep the angular momentum
     for (friction, precision, linear_allowed, angular_allowed) in
-        [(0.0, F64, 1e-13, 1e-5), (0.0, F32, 1e-5, 1e-4), (0.3, F64, 1e-13, f64::INFINITY)]
+        [(0.0, F64, 1e-13, Some(1e-5)), (0.0, F32, 1e-5, Some(1e-4)), (0.3, F64, 1e-13, None)]
     {
         let case = with(
             turn(&even(5), 0.02),
@@ -122,7 +124,9 @@ fn a_bent_thread_that_is_hit_keeps_momentum_and_energy() {
         let apart = |a: [f64; 3], b: [f64; 3]| norm([0, 1, 2].map(|k| a[k] - b[k])) / carried;
         let name = format!("μ {friction}, {precision:?}");
         below(&format!("{name}: change of linear momentum"), apart(p0, p1), linear_allowed);
-        below(&format!("{name}: change of angular momentum over 1 mm"), apart(l0, l1), angular_allowed);
+        if let Some(allowed) = angular_allowed {
+            below(&format!("{name}: change of angular momentum over 1 mm"), apart(l0, l1), allowed);
+        }
         let kinetic = 0.5 * carried * norm([4e3, 900.0, 1500.0]);
         assert!(most > 1e-3 * kinetic, "{name}: nothing was hit");
         let e = simulation.energies();

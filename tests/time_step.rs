@@ -73,7 +73,8 @@ fn the_estimate_holds_for_elements() {
         let mut scene = run::simulation(&loaded, Make { precision: F64, ..Make::default() }).unwrap();
         for &time in times {
             advance(&mut scene, time);
-            check(&format!("{name} at {time:e} s"), &mut scene, share);
+            let state = check(&format!("{name} at {time:e} s"), &mut scene, share);
+            assert!(share > 0.0 || state.limit > 100.0 * state.estimate, "{name} has a limit");
         }
     }
     let yarn = block("yarn", [6, 3, 2], [[0.0, -0.5, -0.2], [2.0, 0.5, 0.2]], 1.8e-9, charmetant());

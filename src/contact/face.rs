@@ -48,6 +48,9 @@ pub struct Closest<R> {
     pub interior: bool,
 }
 
+/// Where a walk has come to: a face, its corners and the point closest to the slave.
+pub type Walked<R> = (Place, Corners<R>, Closest<R>);
+
 impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
     /// A node of a body's surface, and its image shift in quanta.
     #[inline(always)]
@@ -116,7 +119,7 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
     /// Walks from a face downhill in distance to the one closest to the slave. Of two faces whose common edge is closest, the
     /// one that the slave is more in front of is taken: behind the other it need not be inside the body.
     #[inline(always)]
-    pub fn walk(&self, slave: usize, body: usize, image: [i32; 2], from: Place) -> (Place, Corners<R>, Closest<R>) {
+    pub fn walk(&self, slave: usize, body: usize, image: [i32; 2], from: Place) -> Walked<R> {
         let b = self.bodies[body];
         let one = R::from_f64(1.0);
         let mut place = from;
@@ -160,13 +163,7 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
     /// The closest face of all around the slice of one that was found. In front of an open end the two sides of a thin rim may
     /// be as near as each other, and a walk stays on the one that it began on.
     #[inline(always)]
-    pub fn around(
-        &self,
-        slave: usize,
-        body: usize,
-        image: [i32; 2],
-        found: (Place, Corners<R>, Closest<R>),
-    ) -> (Place, Corners<R>, Closest<R>) {
+    pub fn around(&self, slave: usize, body: usize, image: [i32; 2], found: Walked<R>) -> Walked<R> {
         let ring = self.bodies[body].ring as i32;
         let mut best = found;
         for step in 1..ring {
@@ -179,13 +176,7 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
     /// The closest face of one where a walk has ended and those beside it that rise above it: in front of a fold each of its
     /// sides may be where a walk ends.
     #[inline(always)]
-    pub fn beside(
-        &self,
-        slave: usize,
-        body: usize,
-        image: [i32; 2],
-        found: (Place, Corners<R>, Closest<R>),
-    ) -> (Place, Corners<R>, Closest<R>) {
+    pub fn beside(&self, slave: usize, body: usize, image: [i32; 2], found: Walked<R>) -> Walked<R> {
         let ring = self.bodies[body].ring as i32;
         let place = found.0;
         let mut best = found;
@@ -208,14 +199,7 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
 
     /// A face instead of another one if it is closer and not seen from behind.
     #[inline(always)]
-    fn closer(
-        &self,
-        best: (Place, Corners<R>, Closest<R>),
-        slave: usize,
-        body: usize,
-        image: [i32; 2],
-        place: Place,
-    ) -> (Place, Corners<R>, Closest<R>) {
+    fn closer(&self, best: Walked<R>, slave: usize, body: usize, image: [i32; 2], place: Place) -> Walked<R> {
         let corners = self.corners(slave, body, image, place);
         let point = closest(&corners.current);
         if !point.is_behind() && point.better_than(&best.2) { (place, corners, point) } else { best }
