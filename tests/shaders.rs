@@ -112,7 +112,7 @@ fn parameters(file: &str) -> Vec<Field<&'static str>> {
         "dynamics/integrate" => fields!(dynamics::integrate::Params: first_thread, gravity),
         "dynamics/energy" => fields!(dynamics::energy::Params: count, length, into, centre),
         "dynamics/totals" => fields!(dynamics::totals::Params: start, count, lanes, stride, columns, length, into),
-        "dynamics/time_step" => fields!(dynamics::time_step::Params: first_thread, mass_per_stiffness),
+        "dynamics/time_step" => fields!(dynamics::time_step::Params: first_thread, mass_per_stiffness, axial),
         _ => Vec::new(),
     }
 }

@@ -3,10 +3,21 @@
 #include "dynamics/assemble"
 
 #if ROOT
-#if element_limit
+#if held_limit
+@group(1) @binding(0) var<storage, read> conditions: array<u32>;
+@group(1) @binding(1) var<storage, read_write> limit: array<f32>;
+
+// Leaves out nodes that are held altogether.
+fn held_limit(item: u32) {
+    if conditions[2u * item + 1u] == 7u {
+        limit[arrayLength(&limit) / 2u + conditions[2u * item]] = 0.0;
+    }
+}
+#else
 struct Params {
     first_thread: u32,
     mass_per_stiffness: f32,
+    axial: f32,
 }
 
 @group(2) @binding(1) var<uniform> params: Params;
@@ -14,28 +25,39 @@ struct Params {
 @group(1) @binding(0) var<storage, read> solid_bounds: array<u32>;
 @group(1) @binding(1) var<storage, read> hex_bound: array<f32>;
 @group(1) @binding(2) var<storage, read> constant: array<f32>;
-@group(1) @binding(3) var<storage, read> mass: array<f32>;
-@group(1) @binding(4) var<storage, read> thread_slots: array<u32>;
-@group(1) @binding(5) var<storage, read> beam_force: array<f32>;
-@group(1) @binding(6) var<storage, read> beams: array<f32>;
+@group(1) @binding(3) var<storage, read> thread_slots: array<u32>;
+@group(1) @binding(4) var<storage, read> beam_force: array<f32>;
+@group(1) @binding(5) var<storage, read> beams: array<f32>;
 #if BENDING
-@group(1) @binding(7) var<storage, read> bend_slots: array<u32>;
-@group(1) @binding(8) var<storage, read> bends: array<f32>;
-@group(1) @binding(9) var<storage, read> bend_energy: array<f32>;
-@group(1) @binding(10) var<storage, read> bend_force: array<f32>;
-@group(1) @binding(11) var<storage, read> bend_rows: array<f32>;
-const ADDED_MASS: u32 = 12u;
+@group(1) @binding(6) var<storage, read> bend_slots: array<u32>;
+@group(1) @binding(7) var<storage, read> bends: array<f32>;
+@group(1) @binding(8) var<storage, read> bend_energy: array<f32>;
+@group(1) @binding(9) var<storage, read> bend_force: array<f32>;
+@group(1) @binding(10) var<storage, read> bend_rows: array<f32>;
+const NEXT: u32 = 11u;
 #else
-const ADDED_MASS: u32 = 7u;
+const NEXT: u32 = 6u;
 #endif
-#if MASS_ADDED
-@group(1) @binding(ADDED_MASS) var<storage, read> added_mass: array<f32>;
-@group(1) @binding(ADDED_MASS + 1u) var<storage, read_write> limit: array<f32>;
+#if weighed_limit
+@group(1) @binding(NEXT) var<storage, read> limit: array<f32>;
+@group(1) @binding(NEXT + 1u) var<storage, read> ends: array<u32>;
+#if BENDING
+@group(1) @binding(NEXT + 2u) var<storage, read> pairs: array<u32>;
+@group(1) @binding(NEXT + 3u) var<storage, read_write> out: array<f32>;
 #else
-@group(1) @binding(ADDED_MASS) var<storage, read_write> limit: array<f32>;
+@group(1) @binding(NEXT + 2u) var<storage, read_write> out: array<f32>;
+#endif
+#else
+@group(1) @binding(NEXT) var<storage, read> mass: array<f32>;
+#if MASS_ADDED
+@group(1) @binding(NEXT + 1u) var<storage, read> added_mass: array<f32>;
+@group(1) @binding(NEXT + 2u) var<storage, read_write> limit: array<f32>;
+#else
+@group(1) @binding(NEXT + 1u) var<storage, read_write> limit: array<f32>;
+#endif
 #endif
 
-// Numbers of a beam in the table; its length at rest is the fourth.
+// Numbers of a beam in the table; its length at rest is the fourth, EA the fifth.
 const TABLE: u32 = 5u;
 #if BENDING
 // Numbers of a bend's row sums.
@@ -59,9 +81,43 @@ fn stiffening(bend: u32) -> f32 {
 }
 #endif
 
-// Assembles the row sums of element stiffness.
-fn element_limit(node: u32) {
-    var k = constant[node];
+// What a row is weighed with at a node: one, or R/m.
+fn weight(node: u32) -> f32 {
+#if weighed_limit
+    return limit[arrayLength(&limit) / 2u + node];
+#else
+    return 1.0;
+#endif
+}
+
+// Sum of the weights of the nodes of a beam.
+fn both(beam: u32) -> f32 {
+#if weighed_limit
+    return weight(ends[2u * beam]) + weight(ends[2u * beam + 1u]);
+#else
+    return 2.0;
+#endif
+}
+
+#if BENDING
+// Mean weight of the nodes of a bend, by their rows.
+fn mean(bend: u32) -> f32 {
+#if weighed_limit
+    let first = pairs[2u * bend];
+    let second = pairs[2u * bend + 1u];
+    let weights = vec3<f32>(weight(ends[2u * first]), weight(ends[2u * first + 1u]), weight(ends[2u * second + 1u]));
+    let rows = vec3<f32>(bend_rows[ROWS * bend], bend_rows[ROWS * bend + 1u], bend_rows[ROWS * bend + 2u]);
+    return dot(rows, weights) / (rows.x + rows.y + rows.z);
+#else
+    return 1.0;
+#endif
+}
+#endif
+
+// The row sum of a node, weighed if there are weights: bounds of hexahedra are already.
+fn row_sum(node: u32) -> f32 {
+    // the nodes of short lines are alike
+    var k = constant[node] * weight(node);
     if node < params.first_thread {
         for (var i = 0u; i < SOLID; i++) {
             let slot = solid_bounds[SOLID * node + i];
@@ -69,24 +125,42 @@ fn element_limit(node: u32) {
                 k = k + hex_bound[slot];
             }
         }
-    } else {
-        let item = node - params.first_thread;
-        for (var i = 0u; i < THREAD; i++) {
-            let slot = thread_slots[THREAD * item + i];
-            if slot != NONE {
-                let force = vec3<f32>(beam_force[3u * slot], beam_force[3u * slot + 1u], beam_force[3u * slot + 2u]);
-                k = k + 2.0 * length(force) / beams[TABLE * slot + 3u];
-            }
-        }
-#if BENDING
-        for (var i = 0u; i < BENT; i++) {
-            let slot = bend_slots[BENT * item + i];
-            if slot != NONE {
-                k = k + bend_rows[ROWS * slot + i] * stiffening(slot);
-            }
-        }
-#endif
+        return k;
     }
+    let item = node - params.first_thread;
+    for (var i = 0u; i < THREAD; i++) {
+        let slot = thread_slots[THREAD * item + i];
+        if slot != NONE {
+            let force = vec3<f32>(beam_force[3u * slot], beam_force[3u * slot + 1u], beam_force[3u * slot + 2u]);
+            let axial = params.axial * beams[TABLE * slot + 4u];
+            k = k + both(slot) * (length(force) + axial) / beams[TABLE * slot + 3u];
+        }
+    }
+#if BENDING
+    for (var i = 0u; i < BENT; i++) {
+        let slot = bend_slots[BENT * item + i];
+        if slot != NONE {
+            k = k + bend_rows[ROWS * slot + i] * stiffening(slot) * mean(slot);
+        }
+    }
+#endif
+    return k;
+}
+
+#if weighed_limit
+// The mean of R/m around each node.
+fn weighed_limit(node: u32) {
+    // nodes that are held stay out
+    if weight(node) > 0.0 {
+        out[node] = row_sum(node) / limit[node];
+    } else {
+        out[node] = 0.0;
+    }
+}
+#else
+// Assembles the row sums of element stiffness.
+fn element_limit(node: u32) {
+    let k = row_sum(node);
     limit[node] = k;
 #if MASS_ADDED
     let acting = mass[node] + added_mass[node];
@@ -96,16 +170,5 @@ fn element_limit(node: u32) {
     limit[node + arrayLength(&mass)] = k / max(acting, k * params.mass_per_stiffness);
 }
 #endif
-
-#if held_limit
-@group(1) @binding(0) var<storage, read> conditions: array<u32>;
-@group(1) @binding(1) var<storage, read_write> limit: array<f32>;
-
-// Leaves out nodes that are held altogether.
-fn held_limit(item: u32) {
-    if conditions[2u * item + 1u] == 7u {
-        limit[arrayLength(&limit) / 2u + conditions[2u * item]] = 0.0;
-    }
-}
 #endif
 #endif

@@ -28,7 +28,12 @@ struct Params {
 @group(1) @binding(4) var<storage, read> shapes: array<f32>;
 @group(1) @binding(5) var<storage, read> frames: array<f32>;
 @group(1) @binding(6) var<storage, read> materials: array<f32>;
+#if WEIGHED
+@group(1) @binding(7) var<storage, read> weights: array<f32>;
+@group(1) @binding(8) var<storage, read_write> out: array<f32>;
+#else
 @group(1) @binding(7) var<storage, read_write> out: array<f32>;
+#endif
 #if PERIODIC
 #if force
 @group(1) @binding(8) var<storage, read_write> out_virial: array<f32>;
@@ -126,6 +131,18 @@ fn add_virial(block: u32, lane: u32, q: Tensor, stress: Tensor) {
 #endif
 
 #if bound
+// Corners in mesh order of the binary ones.
+const MESH_ORDER = array<u32, 8>(0u, 1u, 3u, 2u, 4u, 5u, 7u, 6u);
+
+// What the rows of stiffness are weighed with at a binary corner: one, or R/m of the node.
+fn weight(h: Hex, corner: u32) -> f32 {
+#if WEIGHED
+    return weights[params.nodes + corners[h.corners + MESH_ORDER[corner] * LANES]];
+#else
+    return 1.0;
+#endif
+}
+
 // Writes the rows of stiffness of the binary corners.
 fn store_rows(block: u32, lane: u32, rows: array<f32, 8>) {
     let at = BOUND * block + lane;

@@ -274,9 +274,10 @@ fn bound(number: u32) {
             slopes[2u * edge + 1u] = abs(high);
             left[2u * edge] = sizes.x;
             left[2u * edge + 1u] = sizes.y;
-            sum = sum + abs(low) + abs(high);
-            sum_across = sum_across + length(low.yz) + length(high.yz);
-            sum_left = sum_left + sizes.x + sizes.y;
+            let w = vec2<f32>(weight(h, 2u * edge), weight(h, 2u * edge + 1u));
+            sum = sum + w.x * abs(low) + w.y * abs(high);
+            sum_across = sum_across + w.x * length(low.yz) + w.y * length(high.yz);
+            sum_left = sum_left + dot(w, sizes);
         }
         let m = moduli(p, here);
         let volume_here = volume(h, point);

@@ -205,8 +205,8 @@ fn bound(number: u32) {
     var sum_slopes = vec3<f32>();
     for (var a = 0u; a < 8u; a++) {
         let b = slope(h, a);
-        total = total + length(b.yz);
-        sum_slopes = sum_slopes + abs(b);
+        total = total + weight(h, a) * length(b.yz);
+        sum_slopes = sum_slopes + weight(h, a) * abs(b);
     }
     for (var a = 0u; a < 8u; a++) {
         let b = slope(h, a);
@@ -224,7 +224,7 @@ fn bound(number: u32) {
             let lower = sign_of(1u, a) * state.modes[1] + sign_of(2u, a) * state.modes[2];
             let apart = lower + sign_of(3u, a) * state.modes[3];
             sizes[a] = b * b * sqrt(dot(apart, apart));
-            total = total + sizes[a];
+            total = total + weight(h, a) * sizes[a];
         }
         add_rows(&rows, 2.0 * m.along * here * total, sizes);
     }
@@ -234,7 +234,7 @@ fn bound(number: u32) {
         total = 0.0;
         for (var a = 0u; a < 8u; a++) {
             sizes[a] = abs(sign_of(mode, a) - dot(sum, slope(h, a)));
-            total = total + sizes[a];
+            total = total + weight(h, a) * sizes[a];
         }
         add_rows(&rows, entry(h, STIFFNESS + mode) * total, sizes);
     }

@@ -6,9 +6,11 @@
 //! of displacements along an edge, is at most 4β times the part along the edge and 4β/(4β − 1) times the part across it. R holds
 //! that part across, the stiffness of the section, longitudinal shear, the tension of fibres and threads, and bending.
 //!
-//! The part across takes the directions of all fibres to differ in the one way that swings fastest. They do not, and a share of
-//! [`COHERENT`] is kept: measured by power iteration, the sheared cell, yarns that are twisted or spread evenly, and one that buckles
-//! need 0.07 to 0.32.
+//! A node that is light between heavy ones, as at the rim of a yarn, swings by itself, and its row sum counts the pull of neighbours that
+//! do not. For any weights v > 0, ω² is at most the largest Σ|K_ab| v_b / (m_a v_a) (Collatz and Wielandt); with v = R/m that is
+//! the mean of R/m of a node's neighbours and itself, by |K_ab|. It is never more than the largest R/m.
+//!
+//! Rows that masses are made heavier for (see [`super::assemble`]) are not weighed: a mass would count in its own weight.
 //!
 //! Mass that contact has added counts: it goes slower than the limit is looked at again. What contact itself calls for is covered by
 //! it, see [`super::assemble`].
@@ -16,7 +18,6 @@
 //! A bend of energy S (T − T₀)², T = tan(θ/2), is (1 + T²)(1 + T² + 2 T (T − T₀)) times as stiff as one that is straight. T comes
 //! from its force on a beam of length l, S (T − T₀)(1 + T²)/l, and its energy.
 
-use crate::elements::LANES;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel};
@@ -36,35 +37,35 @@ pub struct Params {
     pub first_thread: u32,
     /// See [`super::assemble::Params`]: mass that is added for the stiffness of elements counts.
     pub mass_per_stiffness: f32,
+    /// 1 if no fibre lines go along threads, 0 if they do.
+    pub axial: f32,
 }
 
 /// For each solid node, where its corner bounds are.
-pub const SOLID_BOUNDS: usize = 0;
-pub const HEX_BOUND: usize = 1;
-/// Axial stiffness that neither lines nor the bounds of hexahedra cover, N/mm.
-pub const CONSTANT: usize = 2;
-pub const MASS: usize = 3;
+const SOLID_BOUNDS: usize = 0;
+const HEX_BOUND: usize = 1;
+/// Axial stiffness of closed lines that are too short for fibre lines, N/mm.
+const CONSTANT: usize = 2;
 /// Slots of thread nodes, forces of beams and their table.
-pub const THREAD_SLOTS: usize = 4;
-pub const BEAM_FORCE: usize = 5;
-pub const BEAMS: usize = 6;
+const THREAD_SLOTS: usize = 3;
+const BEAM_FORCE: usize = 4;
+const BEAMS: usize = 5;
 /// With `BENDING`: bends of thread nodes; their table, energies and forces, and their row sums.
-pub const BEND_SLOTS: usize = 7;
-pub const BENDS: usize = 8;
-pub const BEND_ENERGY: usize = 9;
-pub const BEND_FORCE: usize = 10;
-pub const BEND_ROWS: usize = 11;
+const BEND_SLOTS: usize = 6;
+const BENDS: usize = 7;
+const BEND_ENERGY: usize = 8;
+const BEND_FORCE: usize = 9;
+const BEND_ROWS: usize = 10;
+/// What comes next with `BENDING`, and without.
+const fn next(bending: bool) -> usize {
+    if bending { 11 } else { 6 }
+}
 /// Numbers of a bend's row sums: of its three nodes while it is straight, N/mm; length of its first beam, mm.
 pub const ROWS: usize = 4;
-/// Added mass, tonne, only with `MASS_ADDED`; without `BENDING` it takes the place of its slots.
-const ADDED_MASS: usize = 12;
-
-/// Share of the part across of fibres that is kept.
-pub const COHERENT: f64 = 0.375;
 
 /// Factor on the part across of fibres, for lines of strength β.
 pub fn left(beta: f64) -> f64 {
-    COHERENT * 4.0 * beta / (4.0 * beta - 1.0).max(0.01)
+    4.0 * beta / (4.0 * beta - 1.0).max(0.01)
 }
 
 /// Difference of T and T₀ below which they count as equal.
@@ -82,10 +83,20 @@ fn stiffening<R: Real>([stiffness, rest]: [R; 2], energy: R, force: R, length: R
     square * (square + (t + t) * further)
 }
 
-/// Assembles the row sums of element stiffness, with those of bends: N/mm, and R/m, 1/s² (2 planes).
-pub struct ElementLimit<const BENDING: bool, const MASS_ADDED: bool>;
+/// Row sums of element stiffness of nodes.
+struct RowSums<'a, R> {
+    first_thread: usize,
+    axial: R,
+    slots: &'a [u32],
+    bounds: &'a [R],
+    constant: &'a [R],
+    thread: &'a [u32],
+    forces: &'a [R],
+    beams: &'a [R],
+    bends: Option<Bends<'a, R>>,
+    weights: Option<Weights<'a, R>>,
+}
 /// What bends say of their stiffness.
-#[derive(Clone, Copy)]
 struct Bends<'a, R> {
     slots: &'a [u32],
     table: &'a [R],
@@ -93,9 +104,93 @@ struct Bends<'a, R> {
     force: &'a [R],
     rows: &'a [R],
 }
+/// What rows are weighed with: R/m of nodes, and the nodes of beams and bends.
+struct Weights<'a, R> {
+    rates: &'a [R],
+    ends: &'a [u32],
+    pairs: &'a [u32],
+}
 
+impl<'a, R: Real> RowSums<'a, R> {
+    #[inline(always)]
+    fn new<const BENDING: bool>(io: &'a Io<R>, params: Params, weights: Option<Weights<'a, R>>) -> Self {
+        Self {
+            first_thread: params.first_thread as usize,
+            axial: R::from_f64(f64::from(params.axial)),
+            slots: io.uints(SOLID_BOUNDS),
+            bounds: io.scalars(HEX_BOUND),
+            constant: io.scalars(CONSTANT),
+            thread: io.uints(THREAD_SLOTS),
+            forces: io.scalars(BEAM_FORCE),
+            beams: io.scalars(BEAMS),
+            bends: BENDING.then(|| Bends {
+                slots: io.uints(BEND_SLOTS),
+                table: io.scalars(BENDS),
+                energy: io.scalars(BEND_ENERGY),
+                force: io.scalars(BEND_FORCE),
+                rows: io.scalars(BEND_ROWS),
+            }),
+            weights,
+        }
+    }
+
+    /// The row sum of a node, weighed if there are weights: bounds of hexahedra are already.
+    #[inline(always)]
+    fn of(&self, node: usize) -> R {
+        let size = |force: &[R]| norm([force[0], force[1], force[2]]);
+        let one = R::from_f64(1.0);
+        // the nodes of short lines are alike
+        let mut k = self.constant[node] * self.weights.as_ref().map_or(one, |w| w.rates[node]);
+        if node < self.first_thread {
+            for &slot in self.slots[SOLID * node..][..SOLID].iter().filter(|slot| **slot != NONE) {
+                k = k + self.bounds[slot as usize];
+            }
+            return k;
+        }
+        let item = node - self.first_thread;
+        for &slot in self.thread[THREAD * item..][..THREAD].iter().filter(|slot| **slot != NONE) {
+            let slot = slot as usize;
+            let both = self.weights.as_ref().map_or(one + one, |w| w.rates[w.end(slot, 0)] + w.rates[w.end(slot, 1)]);
+            let [length, axial] = [self.beams[TABLE * slot + 3], self.axial * self.beams[TABLE * slot + 4]];
+            k = k + both * (size(&self.forces[3 * slot..][..3]) + axial) / length;
+        }
+        if let Some(Bends { slots, table, energy, force, rows }) = &self.bends {
+            let slots = slots[BENT * item..][..BENT].iter().enumerate();
+            for (place, &slot) in slots.filter(|(_, slot)| **slot != NONE) {
+                let slot = slot as usize;
+                let rows = &rows[ROWS * slot..][..ROWS];
+                let bend = [table[BEND * slot], table[BEND * slot + 1]];
+                let force = size(&force[6 * slot..][..3]);
+                let row = rows[place] * stiffening(bend, energy[slot], force, rows[3]);
+                k = k + self.weights.as_ref().map_or(row, |weights| row * weights.mean(slot, rows));
+            }
+        }
+        k
+    }
+}
+
+impl<R: Real> Weights<'_, R> {
+    /// A node of a beam.
+    #[inline(always)]
+    fn end(&self, beam: usize, end: usize) -> usize {
+        self.ends[2 * beam + end] as usize
+    }
+
+    /// Mean over the nodes of a bend, by their rows.
+    #[inline(always)]
+    fn mean(&self, bend: usize, rows: &[R]) -> R {
+        let [first, second] = [self.pairs[2 * bend] as usize, self.pairs[2 * bend + 1] as usize];
+        let rates = [self.end(first, 0), self.end(first, 1), self.end(second, 1)].map(|node| self.rates[node]);
+        (rows[0] * rates[0] + rows[1] * rates[1] + rows[2] * rates[2]) / (rows[0] + rows[1] + rows[2])
+    }
+}
+
+/// Assembles the row sums of element stiffness, with those of bends: N/mm, and R/m, 1/s² (2 planes).
+pub struct ElementLimit<const BENDING: bool, const MASS_ADDED: bool>;
 /// Leaves out nodes that are held altogether: they do not swing.
 pub struct HeldLimit;
+/// The mean of R/m around each node, 1/s².
+pub struct WeighedLimit<const BENDING: bool>;
 
 impl<const BENDING: bool, const MASS_ADDED: bool> Kernel for ElementLimit<BENDING, MASS_ADDED> {
     const SHADER: Shader = Shader {
@@ -105,50 +200,37 @@ impl<const BENDING: bool, const MASS_ADDED: bool> Kernel for ElementLimit<BENDIN
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { first_thread, mass_per_stiffness } = io.params();
-        let least = L::Scalar::from_f64(f64::from(mass_per_stiffness));
-        let (slots, bounds) = (io.uints(SOLID_BOUNDS), io.scalars(HEX_BOUND));
-        let (constant, masses) = (io.scalars(CONSTANT), io.scalars(MASS));
-        let (thread, forces, beams) = (io.uints(THREAD_SLOTS), io.scalars(BEAM_FORCE), io.scalars(BEAMS));
-        let bends = BENDING.then(|| Bends {
-            slots: io.uints(BEND_SLOTS),
-            table: io.scalars(BENDS),
-            energy: io.scalars(BEND_ENERGY),
-            force: io.scalars(BEND_FORCE),
-            rows: io.scalars(BEND_ROWS),
-        });
-        let size = |force: &[L::Scalar]| norm([force[0], force[1], force[2]]);
-        let added_at = if BENDING { ADDED_MASS } else { BEND_SLOTS };
-        let added = MASS_ADDED.then(|| io.scalars(added_at));
-        let mut limits = io.own::<L::Scalar>(added_at + usize::from(MASS_ADDED));
-        debug_assert!(bounds.len() % LANES == 0);
-        let two = L::Scalar::from_f64(2.0);
+        let params: Params = io.params();
+        let least = L::Scalar::from_f64(f64::from(params.mass_per_stiffness));
+        let rows = RowSums::new::<BENDING>(io, params, None);
+        let masses = io.scalars(next(BENDING));
+        let added = MASS_ADDED.then(|| io.scalars(next(BENDING) + 1));
+        let mut limits = io.own::<L::Scalar>(next(BENDING) + 1 + usize::from(MASS_ADDED));
         for node in items {
-            let mut k = constant[node];
-            if node < first_thread as usize {
-                for &slot in slots[SOLID * node..][..SOLID].iter().filter(|slot| **slot != NONE) {
-                    k = k + bounds[slot as usize];
-                }
-            } else {
-                let item = node - first_thread as usize;
-                for &slot in thread[THREAD * item..][..THREAD].iter().filter(|slot| **slot != NONE) {
-                    let slot = slot as usize;
-                    k = k + two * size(&forces[3 * slot..][..3]) / beams[TABLE * slot + 3];
-                }
-                if let Some(Bends { slots, table, energy, force, rows }) = bends {
-                    let slots = slots[BENT * item..][..BENT].iter().enumerate();
-                    for (place, &slot) in slots.filter(|(_, slot)| **slot != NONE) {
-                        let slot = slot as usize;
-                        let rows = &rows[ROWS * slot..][..ROWS];
-                        let bend = [table[BEND * slot], table[BEND * slot + 1]];
-                        let force = size(&force[6 * slot..][..3]);
-                        k = k + rows[place] * stiffening(bend, energy[slot], force, rows[3]);
-                    }
-                }
-            }
+            let k = rows.of(node);
             *limits.at(0, node) = k;
             let mass = added.map_or(masses[node], |added| masses[node] + added[node]);
             *limits.at(1, node) = k / mass.max(k * least);
+        }
+    }
+}
+
+impl<const BENDING: bool> Kernel for WeighedLimit<BENDING> {
+    const SHADER: Shader =
+        Shader { defines: &[when(BENDING, "BENDING")], ..Shader::new("dynamics/time_step", "weighed_limit") };
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let limits = io.scalars(next(BENDING));
+        let (sums, rates) = limits.split_at(limits.len() / 2);
+        let pairs = if BENDING { io.uints(next(BENDING) + 2) } else { &[] };
+        let weights = Weights { rates, ends: io.uints(next(BENDING) + 1), pairs };
+        let rows = RowSums::new::<BENDING>(io, io.params(), Some(weights));
+        let mut out = io.own::<L::Scalar>(next(BENDING) + 2 + usize::from(BENDING));
+        let zero = L::Scalar::from_f64(0.0);
+        for node in items {
+            // nodes that are held stay out
+            *out.at(0, node) = if rates[node] > zero { rows.of(node) / sums[node] } else { zero };
         }
     }
 }

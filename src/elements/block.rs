@@ -31,6 +31,17 @@ pub const fn shader<M: Material, const PERIODIC: bool>(file: &'static str, kerne
     Shader { law: Some(M::SHADER), share: Share::Invocations(LANES), defines, ..Shader::new(file, kernel) }
 }
 
+/// The same for bounds, weighed or not.
+pub const fn weighed_shader<M: Material, const PERIODIC: bool, const WEIGHED: bool>(
+    file: &'static str,
+    kernel: &'static str,
+) -> Shader {
+    Shader {
+        defines: const { &[when(PERIODIC, "PERIODIC"), when(WEIGHED, "WEIGHED")] },
+        ..shader::<M, PERIODIC>(file, kernel)
+    }
+}
+
 /// What the kernels need to know of a block.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable, PartialEq, Eq)]
@@ -65,6 +76,9 @@ pub const FRAMES: usize = 5;
 pub const MATERIALS: usize = 6;
 /// The first write.
 pub const OUT: usize = 7;
+/// Of bounds that are weighed: R/m of nodes in the second plane, and then what they write.
+const WEIGHTS: usize = OUT;
+const WEIGHED_OUT: usize = OUT + 1;
 /// The stress sum, for periodic scenes.
 const OUT_VIRIAL: usize = 8;
 
@@ -163,15 +177,35 @@ impl<'a, L: Lane> Lanes<'a, L> {
         global
     }
 
+    /// What the rows of stiffness are weighed with at the binary corners: one, or with `WEIGHED` R/m of the nodes.
+    #[inline(always)]
+    pub fn weights<const WEIGHED: bool>(&self, io: &Io<L::Scalar>, nodes: usize) -> [L; 8] {
+        let mut weights = [L::new(1.0); 8];
+        if WEIGHED {
+            let limits = &io.scalars(WEIGHTS)[nodes..];
+            let mut buffer = [L::Scalar::from_f64(0.0); LANES];
+            for (corner, &binary) in BINARY.iter().enumerate() {
+                let ids = &self.corners[corner * LANES + self.lane..][..L::WIDTH];
+                for (weight, id) in buffer.iter_mut().zip(ids) {
+                    *weight = limits[*id as usize];
+                }
+                weights[binary] = L::load(&buffer);
+            }
+        }
+        weights
+    }
+
     /// Writes a component of the force on a corner (in mesh order).
     #[inline(always)]
     pub fn store_force(&self, slots: &mut [L::Scalar], corner: usize, component: usize, force: L) {
         force.store(&mut slots[(3 * corner + component) * LANES + self.lane..]);
     }
 
-    /// Writes the rows of stiffness of the binary corners.
+    /// Writes the rows of stiffness of the binary corners of a block.
     #[inline(always)]
-    pub fn store_rows(&self, out: &mut [L::Scalar], rows: &[L; 8]) {
+    pub fn store_rows<const WEIGHED: bool>(&self, io: &Io<L::Scalar>, block: usize, rows: &[L; 8]) {
+        let mut bounds = io.own::<L::Scalar>(if WEIGHED { WEIGHED_OUT } else { OUT });
+        let out = bounds.item(0, block);
         for (corner, &binary) in BINARY.iter().enumerate() {
             rows[binary].store(&mut out[corner * LANES + self.lane..]);
         }
@@ -236,12 +270,12 @@ pub fn cross<L: Lane>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Sum of eight numbers, in order.
+/// Sum of eight numbers by their weights, in order.
 #[inline(always)]
-pub fn total<L: Lane>(numbers: &[L; 8]) -> L {
-    let mut sum = numbers[0];
-    for number in &numbers[1..] {
-        sum = sum + *number;
+pub fn total<L: Lane>(numbers: &[L; 8], weights: &[L; 8]) -> L {
+    let mut sum = numbers[0] * weights[0];
+    for (number, weight) in numbers.iter().zip(weights).skip(1) {
+        sum = number.fma(*weight, sum);
     }
     sum
 }

@@ -5,7 +5,7 @@
 //! fibre's frame first; in periodic scenes the macroscopic gradient F̄ − I is added to H.
 
 use super::LANES;
-use super::block::{BINARY, Lanes, OUT, Params, cross, dot, shader, total};
+use super::block::{BINARY, Lanes, OUT, Params, cross, dot, shader, total, weighed_shader};
 use crate::kernel::lane::Lane;
 use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
@@ -30,8 +30,8 @@ type Derivatives<L> = [[[L; 4]; 3]; 3];
 pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
 /// Energies by mode and smallest Jacobian.
 pub struct Energy<M, const PERIODIC: bool>(PhantomData<M>);
-/// Row sums of the stiffness that fibre lines do not cover, see [`crate::dynamics::time_step`].
-pub struct Bound<M, const PERIODIC: bool>(PhantomData<M>);
+/// Row sums of the stiffness that fibre lines do not cover, with `WEIGHED` by R/m of the nodes: see [`crate::dynamics::time_step`].
+pub struct Bound<M, const PERIODIC: bool, const WEIGHED: bool>(PhantomData<M>);
 
 /// Displacements of the corners relative to the first, in the fibre's frame, by component and binary corner.
 #[inline(always)]
@@ -214,6 +214,7 @@ impl<L: Lane, M: Material> Visitor<L> for Energies<L, M> {
 struct Bounds<L: Lane, M> {
     material: [L; PARAMETERS],
     rows: [L; 8],
+    weights: [L; 8],
     /// Displacement of the high against the low corner of the four edges along ξ, by component.
     edges: [[L; 4]; 3],
     macroscopic: Option<Tensor<L>>,
@@ -283,8 +284,9 @@ impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
         for (across, other) in across.iter_mut().zip(&slopes[2]) {
             *across = other.fma(*other, *across * *across).sqrt();
         }
-        let sums = [total(&slopes[0]), total(&slopes[1]), total(&slopes[2])];
-        let (sum_across, sum_left) = (total(&across), total(&left));
+        let w = &self.weights;
+        let sums = [total(&slopes[0], w), total(&slopes[1], w), total(&slopes[2], w)];
+        let (sum_across, sum_left) = (total(&across, w), total(&left, w));
         let m = M::moduli(&self.material, h);
         let fibres = m.along * L::new(if self.left == 0.0 { 1.0 } else { f64::from(self.left) });
         for a in 0..8 {
@@ -359,13 +361,12 @@ impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
     }
 }
 
-impl<M: Material, const PERIODIC: bool> Kernel for Bound<M, PERIODIC> {
-    const SHADER: Shader = shader::<M, PERIODIC>("elements/hex8", "bound");
+impl<M: Material, const PERIODIC: bool, const WEIGHED: bool> Kernel for Bound<M, PERIODIC, WEIGHED> {
+    const SHADER: Shader = weighed_shader::<M, PERIODIC, WEIGHED>("elements/hex8", "bound");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { nodes, left } = io.params();
-        let mut out = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
                 let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
@@ -373,13 +374,14 @@ impl<M: Material, const PERIODIC: bool> Kernel for Bound<M, PERIODIC> {
                 let mut bounds = Bounds::<L, M> {
                     material: lanes.material(io),
                     rows: [L::new(0.0); 8],
+                    weights: lanes.weights::<WEIGHED>(io, nodes as usize),
                     edges: u.map(|u| [u[1] - u[0], u[3] - u[2], u[5] - u[4], u[7] - u[6]]),
                     macroscopic: lanes.macroscopic::<PERIODIC>(io),
                     left,
                     law: PhantomData,
                 };
                 visit::<_, PERIODIC>(io, &lanes, nodes as usize, &mut bounds);
-                lanes.store_rows(out.item(0, item), &bounds.rows);
+                lanes.store_rows::<WEIGHED>(io, item, &bounds.rows);
             }
         }
     }

@@ -14,7 +14,7 @@
 //! and leaves W. The modes bend fibres within an element: there the fibres' own stiffness has no part.
 
 use super::LANES;
-use super::block::{BINARY, Lanes, OUT, Params, dot, shader, total};
+use super::block::{BINARY, Lanes, OUT, Params, dot, shader, total, weighed_shader};
 use crate::kernel::lane::Lane;
 use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
@@ -47,8 +47,8 @@ const OUT_HOURGLASS: usize = OUT + 1;
 pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
 /// Energies by mode and Jacobian; energy of the hourglass modes.
 pub struct Energy<M, const PERIODIC: bool>(PhantomData<M>);
-/// Row sums of the stiffness that fibre lines do not cover.
-pub struct Bound<M, const PERIODIC: bool>(PhantomData<M>);
+/// Row sums of the stiffness that fibre lines do not cover, with `WEIGHED` by R/m of the nodes: see [`crate::dynamics::time_step`].
+pub struct Bound<M, const PERIODIC: bool, const WEIGHED: bool>(PhantomData<M>);
 
 /// Half the difference and half the sum of B at both ends of an edge along ξ: strain of fibres comes from differences of near
 /// nodes, which f32 does not round.
@@ -238,13 +238,12 @@ fn add_rows<L: Lane>(rows: &mut [L; 8], k_total: L, sizes: &[L; 8]) {
     }
 }
 
-impl<M: Material, const PERIODIC: bool> Kernel for Bound<M, PERIODIC> {
-    const SHADER: Shader = shader::<M, PERIODIC>("elements/hex8_reduced", "bound");
+impl<M: Material, const PERIODIC: bool, const WEIGHED: bool> Kernel for Bound<M, PERIODIC, WEIGHED> {
+    const SHADER: Shader = weighed_shader::<M, PERIODIC, WEIGHED>("elements/hex8_reduced", "bound");
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { nodes, left } = io.params();
-        let mut out = io.own::<L::Scalar>(OUT);
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
                 let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
@@ -261,8 +260,9 @@ impl<M: Material, const PERIODIC: bool> Kernel for Bound<M, PERIODIC> {
                     }
                     across[corner] = b[2].fma(b[2], b[1] * b[1]).sqrt();
                 }
-                let sums = [total(&slopes[0]), total(&slopes[1]), total(&slopes[2])];
-                let sum_across = total(&across);
+                let weights = lanes.weights::<WEIGHED>(io, nodes as usize);
+                let sums = [total(&slopes[0], &weights), total(&slopes[1], &weights), total(&slopes[2], &weights)];
+                let sum_across = total(&across, &weights);
                 let volume = lanes.shape(VOLUME);
                 let m = M::moduli(&lanes.material(io), &h);
                 for (corner, row) in rows.iter_mut().enumerate() {
@@ -288,7 +288,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Bound<M, PERIODIC> {
                         }
                         *size = along * along * square.sqrt();
                     }
-                    add_rows(&mut rows, L::new(2.0) * m.along * volume * total(&sizes), &sizes);
+                    add_rows(&mut rows, L::new(2.0) * m.along * volume * total(&sizes, &weights), &sizes);
                 }
                 // k |γ_a| Σ|γ|
                 for mode in 0..4 {
@@ -297,9 +297,9 @@ impl<M: Material, const PERIODIC: bool> Kernel for Bound<M, PERIODIC> {
                     for (corner, size) in sizes.iter_mut().enumerate() {
                         *size = (L::new(MODES[mode][corner]) - dot(&moment, &slope(&lanes, corner))).abs();
                     }
-                    add_rows(&mut rows, lanes.shape(STIFFNESS + mode) * total(&sizes), &sizes);
+                    add_rows(&mut rows, lanes.shape(STIFFNESS + mode) * total(&sizes, &weights), &sizes);
                 }
-                lanes.store_rows(out.item(0, item), &rows);
+                lanes.store_rows::<WEIGHED>(io, item, &rows);
             }
         }
     }

@@ -22,7 +22,7 @@ use crate::contact::{slot_state, status, travel};
 use crate::dynamics::assemble::{self, Assemble};
 use crate::dynamics::fibre_lines::{self, FibreLines};
 use crate::dynamics::integrate::{self, Integrate};
-use crate::dynamics::time_step::{self, ElementLimit};
+use crate::dynamics::time_step::{self, ElementLimit, WeighedLimit};
 use crate::elements::beam2::Beam2;
 use crate::elements::{LANES, bend, block};
 use crate::error::Result;
@@ -261,7 +261,9 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         _ => 0.0,
     };
     let params = block::Params { nodes: nodes as u32, left };
-    let hex = HexBuffers::add(&mut b, &solids, [quanta_, remainder], periodic, hourglass.is_some(), params);
+    let element_limit = b.scratch("element stiffness of nodes", 2 * nodes);
+    let position = [quanta_, remainder];
+    let hex = HexBuffers::add(&mut b, &solids, position, element_limit, periodic, hourglass.is_some(), params);
     let ends = b.indices("beam ends", threads.ends.clone());
     let beam_table = b.table("beams", threads.beams.clone());
     let beam_force = b.scratch("beam forces", 3 * beams);
@@ -284,19 +286,18 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let bent = active.bending.then(|| Bent {
         table: b.table("bends", threads.bends.clone()),
         slots: b.indices("bend slots of thread nodes", threads.bend_slots.clone()),
+        pairs: b.indices("bend beams", threads.pairs.clone()),
         force: b.scratch("bend forces", 6 * bends),
         energy: b.scratch("bend energies", bends),
     });
     let bend_virial = (active.bending && periodic).then(|| b.scratch("bend stress sums", 9 * bends));
     if let Some(bent) = &bent {
-        let pairs = b.indices("bend beams", threads.pairs.clone());
-        let reads = [pairs, bent.table, ends, beam_table, quanta_, remainder];
+        let reads = [bent.pairs, bent.table, ends, beam_table, quanta_, remainder];
         let mut writes = vec![(bent.force, own(1, 6)), (bent.energy, own(1, 1))];
         writes.extend(bend_virial.map(|virial| (virial, own(1, 9))));
         b.plan.step.push(coded(flagged!(bend::Bend; periodic), "bend", bends, 64, &reads, &writes, [0u32; 0]));
     }
 
-    let element_limit = b.scratch("element stiffness of nodes", 2 * nodes);
     let searched = active.searches().then(|| {
         let quanta = b.add("quanta at the last search", Kind::Int, 3 * nodes, true, Initial::Zero);
         [quanta, b.add("remainder at the last search", Kind::Scalar, 3 * nodes, true, Initial::Zero)]
@@ -417,16 +418,25 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         // in the bounds of hexahedra
         covered[..first].fill(true);
     }
+    let lines_on_threads = active.fibre_lines && effects.fibre_lines.as_ref().is_some_and(|lines| lines.threads);
+    if !lines_on_threads {
+        // in the rows of beams
+        covered[first..].fill(true);
+    }
     let constant = constant_stiffness(mesh, &line_stiffness, &covered);
     let constant = b.table("constant stiffness of nodes", constant);
     let solid_bounds = b.indices("corner bounds of solid nodes", solids.bounds.clone());
-    let mut reads = vec![solid_bounds, hex.bound, constant, mass, thread_slots, beam_force, beam_table];
+    let mut rows = vec![solid_bounds, hex.bound, constant, thread_slots, beam_force, beam_table];
     if let Some(bent) = &bent {
-        let rows = b.table("bend rows", threads.bend_rows.clone());
-        reads.extend([bent.slots, bent.table, bent.energy, bent.force, rows]);
+        let of_bends = b.table("bend rows", threads.bend_rows.clone());
+        rows.extend([bent.slots, bent.table, bent.energy, bent.force, of_bends]);
     }
-    reads.extend(added_mass);
-    let params = time_step::Params { first_thread, mass_per_stiffness: assemble_params.mass_per_stiffness };
+    let reads: Vec<Buffer> = rows.iter().copied().chain([mass]).chain(added_mass).collect();
+    let params = time_step::Params {
+        first_thread,
+        mass_per_stiffness: assemble_params.mass_per_stiffness,
+        axial: f32::from(u8::from(!lines_on_threads)),
+    };
     let writes = [(element_limit, own(2, 1))];
     let kernel = flagged!(ElementLimit; active.bending, active.contact_mass);
     b.plan.diagnose.push(waiting(coded(kernel, "element limit", nodes, NODE_GRAIN, &reads, &writes, params)));
@@ -435,6 +445,13 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         let held = after::<time_step::HeldLimit>("held limit", count, NODE_GRAIN, &[at], &writes, [0u32; 0]);
         b.plan.diagnose.push(held);
     }
+    b.plan.diagnose.extend(hex.weighed_bounds);
+    let weighed_limit = b.scratch("weighed limit of nodes", nodes);
+    let reads: Vec<Buffer> =
+        rows.into_iter().chain([element_limit, ends]).chain(bent.as_ref().map(|bent| bent.pairs)).collect();
+    let writes = [(weighed_limit, own(1, 1))];
+    let kernel = flagged!(WeighedLimit; active.bending);
+    b.plan.diagnose.push(waiting(coded(kernel, "weighed limit", nodes, NODE_GRAIN, &reads, &writes, params)));
 
     let (faces, pairs) = contact.as_ref().map_or((None, None), |c| (c.faces, c.pairs));
     let sources = totals::Sources {
@@ -450,7 +467,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         velocity,
         reference,
         work,
-        element_limit,
+        weighed_limit,
         beam_table,
         hex_energy: hex.energy,
         hex_hourglass: hex.hourglass,
@@ -524,6 +541,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
 
 /// Buffers of bends.
 struct Bent {
+    pairs: Buffer,
     table: Buffer,
     /// Bends at each thread node.
     slots: Buffer,

@@ -95,7 +95,7 @@ pub(super) struct Sources<'a> {
     pub velocity: Buffer,
     pub reference: Buffer,
     pub work: Option<Buffer>,
-    pub element_limit: Buffer,
+    pub weighed_limit: Buffer,
     pub beam_table: Buffer,
     pub hex_energy: Option<Buffer>,
     pub hex_hourglass: Option<Buffer>,
@@ -294,7 +294,7 @@ pub(super) fn add(b: &mut Builder, s: &Sources) -> (Totals, Option<Buffer>) {
             let jacobians = Columns { start: 4 * LANES, ..Columns::blocks(s.hex_blocks, ENERGY, 1) };
             c.largest(energy, jacobians, Some(used))
         }),
-        stiffness: c.largest(s.element_limit, Columns::range(nodes..2 * nodes), None),
+        stiffness: c.largest(s.weighed_limit, Columns::range(0..nodes), None),
     };
     (totals, slip)
 }

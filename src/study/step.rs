@@ -1,4 +1,8 @@
 //! `tricot study step`: the limit of the time step that a scene really has beside the one that is estimated, on its way.
+//!
+//! Contact adds the mass that a step of its length needs, and the measured limit is the longest step that lasts with its own mass. The
+//! estimate counts the mass of the step in use. So that both speak of one scene, steps here may grow to [`LIFTED`] times the longest
+//! that the case allows, in effect to what the estimate says.
 
 use crate::case::read::Loaded;
 use crate::case::steps::{Precision, Step};
@@ -10,6 +14,8 @@ use std::fmt::Write as _;
 
 /// Steps within which one that is too long must show.
 const TRIAL: u64 = 2000;
+/// Factor on the longest step that the case allows.
+const LIFTED: f64 = 10.0;
 /// Relative width at which the search for the longest step that holds ends.
 const NARROW: f64 = 0.05;
 
@@ -122,7 +128,7 @@ pub fn longest_step(loaded: &Loaded, scene: &mut Simulation, most: f64) -> Resul
     Ok((low, high))
 }
 
-/// Runs a case in f64 and measures the limit at the end of every load step and at every multiple of `every_deg` of shear; if
+/// Runs a case in f64, with steps as long as the estimate says, and measures the limit at the end of every load step and at every multiple of `every_deg` of shear; if
 /// `confirm`, also tries fixed steps at the end of the first load step.
 ///
 /// # Errors
@@ -130,6 +136,7 @@ pub fn longest_step(loaded: &Loaded, scene: &mut Simulation, most: f64) -> Resul
 pub fn step(loaded: &Loaded, every_deg: f64, confirm: bool) -> Result<Study> {
     let mut loaded = loaded.clone();
     loaded.case.integration.precision = Precision::F64;
+    loaded.case.integration.dt_max_s *= LIFTED;
     let mut scene = run::simulation(&loaded, Make { precision: Precision::F64, ..Make::default() })?;
     let (mut text, mut held) = (String::new(), true);
     let moments = moments(&scene.schedule, every_deg);
