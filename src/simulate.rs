@@ -400,6 +400,7 @@ impl Simulation {
         if self.model.plan.search.is_empty() {
             return Ok(());
         }
+        let mut crowded = None;
         // what an overflowing search drops depends on the order in which cells were filled: it must leave no trace
         for _ in 0..8 {
             let b = &self.model.buffers;
@@ -417,6 +418,7 @@ impl Simulation {
                 self.gradient_at_search = self.load();
                 return Ok(());
             }
+            crowded = self.most_crowded();
             let mut capacity = self.capacity;
             if full & status::CELL_FULL != 0 {
                 capacity.cell *= 2;
@@ -430,7 +432,11 @@ impl Simulation {
         }
         Err(self.guard(
             "contact overflow",
-            format!("more candidates than {:?}", self.capacity),
+            format!(
+                "more candidates than {:?}{}",
+                self.capacity,
+                crowded.map_or_else(String::new, |place| format!("; most crowded: {place}"))
+            ),
             "bodies have collapsed onto each other: lower the load or its speed",
         ))
     }

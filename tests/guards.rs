@@ -74,10 +74,13 @@ fn energy_from_nowhere() {
     simulation.set_velocities(&thrown);
     let guard = stopped(&mut simulation, 1e-3);
     assert!(guard.cause == "energy" || guard.cause == "inversion", "{guard}");
+    assert!(guard.culprit.contains("(cube)") || guard.culprit.contains("of cube"), "{guard}");
     let mut whole = start(&scene(json!([cube("cube", [0.0; 3])]), Value::Null, json!({})), F32);
     common::advance(&mut whole, 1e-5);
     whole.set_velocities(&[[100.0, 0.0, 0.0]; 27]);
-    assert_eq!(stopped(&mut whole, 1e-3).cause, "energy");
+    let guard = stopped(&mut whole, 1e-3);
+    assert_eq!(guard.cause, "energy");
+    assert!(guard.culprit.contains("fastest now: node ") && guard.culprit.contains(" (cube) at "), "{guard}");
 }
 
 #[test]
@@ -113,6 +116,7 @@ fn more_bodies_in_one_place_than_tables_can_hold() {
     let blocks: Vec<Value> = (0..20).map(|i| cube(&format!("cube {i}"), [0.01 * f64::from(i), 0.0, 0.0])).collect();
     let guard = stopped(&mut start(&scene(json!(blocks), json!({}), json!({})), F32), 1e-3);
     assert_eq!(guard.cause, "contact overflow");
+    assert!(guard.culprit.contains("most crowded: node ") && guard.culprit.contains(" (cube "), "{guard}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::kernel::buffer::Buffer;
 use crate::kernel::position::MOST_MM;
 
 /// A step that is longer than the estimated limit by this factor is taken for unstable: the estimate is a bound from below, and
-/// measured limits were up to 2.9 times as large.
+/// measured limits were up to 2.3 times as large.
 const SURELY_UNSTABLE: f64 = 3.0;
 
 impl Simulation {
@@ -33,10 +33,12 @@ impl Simulation {
         }
         let tolerance = self.case.integration.energy_tolerance;
         if h.balance.abs() > tolerance {
+            let (node, speed) = self.fastest();
             let culprit = format!(
-                "the energy balance is off by {:.1} % (tolerance {:.1} %)",
+                "the energy balance is off by {:.1} % (tolerance {:.1} %); fastest now: node {node} ({}) at {speed:.3e} mm/s",
                 100.0 * h.balance,
-                100.0 * tolerance
+                100.0 * tolerance,
+                self.node_owner(node)
             );
             return Err(self.guard("energy", culprit, "lower integration.safety or integration.dt_max_s"));
         }
@@ -83,6 +85,30 @@ impl Simulation {
         let node = self.model.slaves[item].node;
         let body = &self.mesh.blocks[body].name;
         Some(format!("node {node} ({}) in {body}", self.node_owner(node)))
+    }
+
+    /// The slave node or the beam with most candidates for contact.
+    pub(super) fn most_crowded(&self) -> Option<String> {
+        let b = &self.model.buffers;
+        // the first item with most, of those with `slots` keys of `stride` numbers
+        let most = |keys: Buffer, stride: usize, slots: usize| {
+            let keys = self.backend.uints(keys);
+            let count = |item: &[u32]| item.chunks_exact(stride).filter(|key| key[0] != EMPTY).count();
+            let counts = keys.chunks_exact(stride * slots).map(count).enumerate();
+            counts.fold((0, 0), |best, now| if now.1 > best.1 { now } else { best })
+        };
+        let slave = b.contact_keys.map_or((0, 0), |keys| most(keys, SLOT_KEYS, self.capacity.slots));
+        let beam = b.pair_keys.map_or((0, 0), |keys| most(keys, 1, self.capacity.beam_slots));
+        if slave.1 + beam.1 == 0 {
+            return None;
+        }
+        let (what, count) = if slave.1 >= beam.1 {
+            let node = self.model.slaves[slave.0].node;
+            (format!("node {node} ({})", self.node_owner(node)), slave.1)
+        } else {
+            (format!("beam {}", beam.0), beam.1)
+        };
+        Some(format!("{what} with {count}"))
     }
 
     /// Stops a step that the user fixed and that cannot be stable; one that follows the estimate shortens by itself.
@@ -147,6 +173,12 @@ impl Simulation {
             return Err(self.guard("force range", culprit, "lower integration.safety, or load more slowly"));
         }
         Ok(())
+    }
+
+    /// The fastest node, and its speed against the macroscopic motion, mm/s.
+    fn fastest(&self) -> (usize, f64) {
+        let speeds = self.velocities().into_iter().map(|v| v.iter().map(|c| c * c).sum::<f64>().sqrt());
+        speeds.enumerate().fold((0, 0.0), |best, now| if now.1 > best.1 { now } else { best })
     }
 
     /// The node with the largest displacement along an axis, and that, mm.
