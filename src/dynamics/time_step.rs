@@ -6,14 +6,15 @@
 //! of displacements along an edge, is at most 4β times the part along the edge and 4β/(4β − 1) times the part across it. R holds
 //! that part across, the stiffness of the section, longitudinal shear, the tension of fibres and threads, and bending.
 //!
-//! A node that is light between heavy ones, as at the rim of a yarn, swings by itself, and its row sum counts the pull of neighbours that
-//! do not. For any weights v > 0, ω² is at most the largest Σ|K_ab| v_b / (m_a v_a) (Collatz and Wielandt); with v = R/m that is
-//! the mean of R/m of a node's neighbours and itself, by |K_ab|. It is never more than the largest R/m.
+//! A node that is light between heavy ones, as at the rim of a yarn, swings by itself, and its row sum counts the pull of
+//! neighbours that do not. For any weights v > 0, ω² is at most the largest Σ|K_ab| v_b / (m_a v_a) (Collatz and Wielandt);
+//! with v = R/m that is the mean of R/m of a node's neighbours and itself, by |K_ab|. It is never more than the largest
+//! R/m.
 //!
 //! Rows that masses are made heavier for (see [`super::assemble`]) are not weighed: a mass would count in its own weight.
 //!
-//! Mass that contact has added counts: it goes slower than the limit is looked at again. What contact itself calls for is covered by
-//! it, see [`super::assemble`].
+//! Mass that contact has added counts: it goes slower than the limit is looked at again. What contact itself calls for is
+//! covered by it, see [`super::assemble`].
 //!
 //! A bend of energy S (T − T₀)², T = tan(θ/2), is (1 + T²)(1 + T² + 2 T (T − T₀)) times as stiff as one that is straight. T comes
 //! from its force on a beam of length l, S (T − T₀)(1 + T²)/l, and its energy.

@@ -30,7 +30,8 @@ type Derivatives<L> = [[[L; 4]; 3]; 3];
 pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
 /// Energies by mode and smallest Jacobian.
 pub struct Energy<M, const PERIODIC: bool>(PhantomData<M>);
-/// Row sums of the stiffness that fibre lines do not cover, with `WEIGHED` by R/m of the nodes: see [`crate::dynamics::time_step`].
+/// Row sums of the stiffness that fibre lines do not cover, with `WEIGHED` by R/m of the nodes: see
+/// [`crate::dynamics::time_step`].
 pub struct Bound<M, const PERIODIC: bool, const WEIGHED: bool>(PhantomData<M>);
 
 /// Displacements of the corners relative to the first, in the fibre's frame, by component and binary corner.

@@ -47,7 +47,8 @@ const OUT_HOURGLASS: usize = OUT + 1;
 pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
 /// Energies by mode and Jacobian; energy of the hourglass modes.
 pub struct Energy<M, const PERIODIC: bool>(PhantomData<M>);
-/// Row sums of the stiffness that fibre lines do not cover, with `WEIGHED` by R/m of the nodes: see [`crate::dynamics::time_step`].
+/// Row sums of the stiffness that fibre lines do not cover, with `WEIGHED` by R/m of the nodes: see
+/// [`crate::dynamics::time_step`].
 pub struct Bound<M, const PERIODIC: bool, const WEIGHED: bool>(PhantomData<M>);
 
 /// Half the difference and half the sum of B at both ends of an edge along ξ: strain of fibres comes from differences of near

@@ -33,8 +33,8 @@ struct Blocks<'a> {
 }
 
 impl HexBuffers {
-    /// Adds tables, results and stages, but for those of weighed bounds; `position` are quanta and remainder of displacements, `limits`
-    /// the row sums and R/m of nodes.
+    /// Adds tables, results and stages, but for those of weighed bounds; `position` are quanta and remainder of
+    /// displacements, `limits` the row sums and R/m of nodes.
     pub(super) fn add(
         b: &mut Builder,
         solids: &Solids,

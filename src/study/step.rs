@@ -1,8 +1,8 @@
 //! `tricot study step`: the limit of the time step that a scene really has beside the one that is estimated, on its way.
 //!
-//! Contact adds the mass that a step of its length needs, and the measured limit is the longest step that lasts with its own mass. The
-//! estimate counts the mass of the step in use. So that both speak of one scene, steps here may grow to [`LIFTED`] times the longest
-//! that the case allows, in effect to what the estimate says.
+//! Contact adds the mass that a step of its length needs, and the measured limit is the longest step that lasts with its
+//! own mass. The estimate counts the mass of the step in use. So that both speak of one scene, steps here may grow to
+//! [`LIFTED`] times the longest that the case allows, in effect to what the estimate says.
 
 use crate::case::read::Loaded;
 use crate::case::steps::{Precision, Step};
