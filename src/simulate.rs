@@ -24,6 +24,7 @@ use crate::case::domain::{Clamps, Domain};
 use crate::case::steps::Precision;
 use crate::contact::status;
 use crate::contact::threads::MOST_PAIRS;
+use crate::contact::travel::{SKIN_MOVED, SKIN_USED};
 use crate::dynamics::time_step;
 use crate::error::{Error, Result};
 use crate::kernel::buffer::{Buffer, Initial};
@@ -45,8 +46,6 @@ const CALM: f64 = 1.4;
 const STEADY: f64 = 0.1;
 /// Energy below which rounding decides its balance, mJ.
 const NOISE: f64 = 1e-6;
-/// Share of the contact skin that nodes may travel before a search.
-const SKIN_USED: f64 = 0.35;
 /// Length over which the affine motion between two searches is counted, mm.
 const AFFINE_REACH: f64 = 2.0;
 /// Speeds may grow by this factor during a burst.
@@ -96,6 +95,8 @@ pub struct Simulation {
     /// Factor on the time step: below one in a run that has gone back.
     share: f64,
     searches: u64,
+    /// Seconds in stages of backends that larger tables have replaced.
+    spent_before: Vec<(&'static str, f64)>,
     /// Largest speed of a node after the last burst, mm/s.
     speed: f64,
     /// Steps of the next burst.
@@ -207,6 +208,7 @@ impl Simulation {
             dt_before: 0.0,
             share: 1.0,
             searches: 0,
+            spent_before: Vec::new(),
             speed: 1e9,
             burst: BURST,
             diagnosed: 0,
@@ -239,6 +241,17 @@ impl Simulation {
     /// Contact searches so far.
     pub fn searches(&self) -> u64 {
         self.searches
+    }
+    /// Seconds spent in each stage so far, by name.
+    pub fn timings(&self) -> Vec<(&'static str, f64)> {
+        let mut all = self.spent_before.clone();
+        for (name, spent) in self.backend.timings() {
+            match all.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, total)) => *total += spent,
+                None => all.push((name, spent)),
+            }
+        }
+        all
     }
     pub fn energies(&self) -> &Energies {
         &self.energies
@@ -310,7 +323,7 @@ impl Simulation {
         self.ready = true;
         self.dt = self.share * self.case.integration.dt_s.unwrap_or(self.case.integration.dt_max_s);
         self.dt_before = self.dt;
-        self.search()?;
+        self.search_all()?;
         self.bend_at_rest();
         let totals = self.diagnose(self.schedule.row(self.time, self.dt, self.dt_before))?;
         self.guard_step()?;
@@ -356,9 +369,12 @@ impl Simulation {
         let contact = self.case.effects.contact.as_ref().filter(|_| self.model.active.searches());
         let skin = contact.map_or(f64::INFINITY, |c| c.skin_mm);
         let mut left = SKIN_USED * skin - travel - affine;
-        if left < 0.0 || load.radius > self.gradient_at_search.radius {
-            self.search()?;
+        if affine > SKIN_MOVED * skin || load.radius > self.gradient_at_search.radius {
+            self.search_all()?;
             left = SKIN_USED * skin;
+        } else if left < 0.0 {
+            self.search()?;
+            left = (SKIN_USED - SKIN_MOVED) * skin - affine;
         }
         // a float that is too large for an integer becomes the largest one
         let sure = (left.min(FARTHEST) / (SPEED_MARGIN * self.speed * self.dt)) as u64;
@@ -395,17 +411,24 @@ impl Simulation {
         }
     }
 
-    /// Runs the contact search, with larger tables if they overflow.
+    /// Searches contact everywhere.
+    fn search_all(&mut self) -> Result<()> {
+        if let Some(moved) = self.model.buffers.moved {
+            self.backend.set_bytes(moved, bytemuck::cast_slice(&vec![1u32; self.mesh.nodes.len()]));
+        }
+        self.search()?;
+        self.gradient_at_search = self.load();
+        Ok(())
+    }
+
+    /// Runs the contact search around nodes that have moved, with larger tables if they overflow: what does not fit is left as it
+    /// was, so that a search that overflows leaves nothing that the next one does not find again.
     fn search(&mut self) -> Result<()> {
         if self.model.plan.search.is_empty() {
             return Ok(());
         }
         let mut crowded = None;
-        // what an overflowing search drops depends on the order in which cells were filled: it must leave no trace
         for _ in 0..8 {
-            let b = &self.model.buffers;
-            let known = [b.contact_keys, b.contact_state, b.pair_keys, b.pair_state];
-            self.backend.save(&known.into_iter().flatten().collect::<Vec<_>>());
             let row = self.schedule.row(self.time, self.dt, self.dt_before);
             self.backend.run(&self.model.plan.search, &[row]);
             let status = self.backend.uints(self.model.buffers.status);
@@ -415,7 +438,6 @@ impl Simulation {
             if full == 0 {
                 self.check_flags(&status)?;
                 self.searches += 1;
-                self.gradient_at_search = self.load();
                 return Ok(());
             }
             crowded = self.most_crowded();
@@ -427,7 +449,6 @@ impl Simulation {
                 capacity.slots = (capacity.slots * 2).min(16);
                 capacity.beam_slots = (capacity.beam_slots * 2).min(MOST_PAIRS);
             }
-            self.backend.restore();
             self.grow(capacity)?;
         }
         Err(self.guard(
@@ -459,6 +480,7 @@ impl Simulation {
             backend.set_bytes(Buffer(new), &bytes);
         }
         self.alive()?;
+        self.spent_before = self.timings();
         self.model = model;
         self.backend = backend;
         self.capacity = capacity;

@@ -9,7 +9,8 @@ use common::{
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use tricot::case::steps::Precision::{self, F32, F64};
-use tricot::contact::face;
+use tricot::contact::{EMPTY, face, grid};
+use tricot::kernel::buffer::Buffer;
 use tricot::mesh::Mesh;
 use tricot::mesh::surface::Surface;
 use tricot::simulate::Simulation;
@@ -461,5 +462,86 @@ fn the_search_finds_what_brute_force_finds() {
         assert!(touching > 100, "{touching} points touch");
         println!("{missed} of {touching} touching points differ");
         below(&format!("{precision:?}: depths of 400 points ({touching} touch) in 288 faces, mm"), worst, allowed);
+    }
+}
+
+/// A slab and two threads that nothing but conditions moves: the slab, the first and the second by displacements, mm.
+fn moved_apart(displacements: [[f64; 3]; 3], high: f64, precision: Precision) -> Simulation {
+    let slab = block("slab", [16, 4, 1], [[-4.0, -1.0, -0.5], [4.0, 1.0, 0.0]], 1e-9, neo_hookean(1000.0, 0.3));
+    let thread = |name: &str, x: f64| {
+        // over the middles of faces
+        let nodes = [[x, 0.25, high], [x + 0.5, 0.25, high]];
+        json!({ "name": name, "nodes": nodes, "radius_mm": 0.2, "axial_n": 1, "linear_density_tex": 10 })
+    };
+    let everywhere = [[-9, -9, -9], [9, 9, 9]];
+    let conditions = ["slab", "first", "second"]
+        .map(|body| json!({ "within": everywhere, "body": body }))
+        .into_iter()
+        .zip(displacements)
+        .map(|(condition, by)| with(condition, &[("/displacement_mm", json!(by))]));
+    let case = with(
+        scene(json!([slab]), json!({ "thread_penalty_n_mm2": 50, "damping_ratio": 0, "skin_mm": 0.1 })),
+        &[
+            ("/domain/mesh/threads", json!([thread("first", -2.75), thread("second", 0.25)])),
+            ("/domain/mesh/conditions", json!(conditions.collect::<Vec<_>>())),
+            ("/steps", json!([{ "move": { "time_s": 1e-3 } }])),
+            ("/integration", json!({ "dt_s": 2e-7, "energy_tolerance": 100 })),
+        ],
+    );
+    start(&case, precision)
+}
+
+#[test]
+fn contact_is_searched_again_only_around_what_has_moved() {
+    // cells that hold something, and those near what had moved at the last search
+    let cells = |simulation: &Simulation| {
+        let buffers = &simulation.model.plan.buffers;
+        let counts = buffers.iter().position(|buffer| buffer.name == "items of cells").unwrap();
+        let counts = simulation.backend().uints(Buffer(counts));
+        let count = |holds: fn(&u32) -> bool| counts.iter().filter(|count| holds(count)).count();
+        (count(|count| *count > 0), count(|count| count & grid::MOVED_HERE != 0))
+    };
+    let force = |simulation: &Simulation| {
+        let first = simulation.mesh.first_thread_node();
+        field(simulation, "contact_force_n")[first..].to_vec()
+    };
+    for (precision, allowed) in [(F64, 3e-6), (F32, 1e-4)] {
+        // the second thread slides over the slab, the first one lies on it
+        let mut simulation = moved_apart([[0.0; 3], [0.0; 3], [2.0, 0.0, 0.0]], 0.15, precision);
+        advance(&mut simulation, 1e-6);
+        let (held, everywhere) = cells(&simulation);
+        assert_eq!(held, everywhere, "the first search is one of everything");
+        let before = force(&simulation);
+        advance(&mut simulation, 1e-3);
+        let (held, moved) = cells(&simulation);
+        println!("{precision:?}: {} searches, the last one in {moved} of {held} cells", simulation.searches());
+        assert!(simulation.searches() > 50 && moved > 0 && 4 * moved < held);
+        let after = force(&simulation);
+        assert_eq!(before[..2], after[..2], "the thread that lies still");
+        let expected = 50.0 * 0.25 * 0.05;
+        after.iter().for_each(|force| near("force on a thread, N", *force, expected, allowed));
+        // the slab comes up to both, from out of reach
+        let mut simulation = moved_apart([[0.0, 0.0, 0.3], [0.0; 3], [0.0; 3]], 0.4, precision);
+        advance(&mut simulation, 1e-6);
+        assert!(force(&simulation).iter().all(|force| *force == 0.0));
+        advance(&mut simulation, 1e-3);
+        force(&simulation).iter().for_each(|force| near("force on a thread, N", *force, 2.0 * expected, allowed));
+    }
+}
+
+/// Nodes of a yarn before the cut end of another one, below the plane of its upper side, are not in it.
+#[test]
+fn what_is_before_a_cut_end_is_not_behind_its_sides() {
+    let yarn = block("yarn", [8, 2, 1], [[0.0, 0.0, 0.0], [2.0, 1.0, 0.4]], 1e-9, neo_hookean(10.0, 0.3));
+    let other = block("other", [2, 2, 1], [[-0.53, 0.2, 0.3], [-0.03, 0.8, 0.7]], 1e-9, neo_hookean(10.0, 0.3));
+    let case = with(
+        scene(json!([yarn, other]), json!({ "skin_mm": 0.12 })),
+        &[("/steps", json!([{ "hold": { "time_s": 1e-5 } }])), ("/integration", json!({ "dt_s": 1e-7 }))],
+    );
+    for precision in [F64, F32] {
+        let mut simulation = start(&case, precision);
+        advance(&mut simulation, 1e-5);
+        let keys = simulation.backend().uints(simulation.model.buffers.contact_keys.unwrap());
+        assert!(keys.iter().all(|key| *key == EMPTY), "{precision:?}: {:?}", &keys[..12]);
     }
 }

@@ -104,6 +104,7 @@ fn parameters(file: &str) -> Vec<Field<&'static str>> {
             force_quantum, stiffness_quantum, thread_radius, thread_thread, self_arc, depth, state
         ),
         "conditions/prescribed" => fields!(conditions::prescribed::Params: first_thread, gravity),
+        "contact/travel" => fields!(contact::travel::Params: moved),
         "dynamics/assemble" => fields!(
             dynamics::assemble::Params: first_thread, force_quantum, stiffness_quantum, mass_factor, mass_memory,
             mass_per_stiffness

@@ -17,9 +17,10 @@
 @group(1) @binding(8) var<storage, read> counts: array<u32>;
 @group(1) @binding(9) var<storage, read> lists: array<u32>;
 @group(1) @binding(10) var<storage, read> boxes: array<f32>;
-@group(1) @binding(11) var<storage, read_write> keys: array<u32>;
-@group(1) @binding(12) var<storage, read_write> states: array<f32>;
-@group(1) @binding(13) var<storage, read_write> status: array<atomic<u32>>;
+@group(1) @binding(11) var<storage, read> moved: array<u32>;
+@group(1) @binding(12) var<storage, read_write> keys: array<u32>;
+@group(1) @binding(13) var<storage, read_write> states: array<f32>;
+@group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
 
 // Bodies that one slave can be near to before the search gives up.
 const MOST: u32 = 16u;
@@ -99,7 +100,7 @@ fn best_of(slave: u32, body: u32, image: vec2<i32>, slice: i32, first: i32, reac
         let face = Near(point.distance, Place(ring, slice));
         if height(point) >= 0.0 || IS_THREAD && !point.interior {
             best.in_front = nearer(best.in_front, face);
-        } else if normal_and_distance(point, IS_THREAD).faces {
+        } else if normal_and_distance(point, IS_THREAD).faces && !is_rim(body, face.place, point) {
             best.behind = nearer(best.behind, face);
         }
     }
@@ -119,73 +120,85 @@ fn candidates(item: u32) {
 #if PERIODIC
     let period = vec2<f32>(params.period) * QUANTUM;
 #endif
+    if !(is_finite(position.x) && is_finite(position.y) && is_finite(position.z)) {
+        atomicOr(&status[FLAGS], NOT_FINITE);
+        return;
+    }
+    let cell = cell_index(cells(0u, position.x, position.x).x, cells(1u, position.y, position.y).x);
+    if (counts[cell] & MOVED_HERE) == 0u && moved[slave] == 0u {
+        return;
+    }
+    let listed = counts[cell] & ~MOVED_HERE;
+    // overflow keeps what was known, and is searched again with larger tables
+    if listed > params.capacity {
+        return;
+    }
     var found: array<Best, MOST>;
     var count = 0u;
-    if is_finite(position.x) && is_finite(position.y) && is_finite(position.z) {
-        let cell = cell_index(cells(0u, position.x, position.x).x, cells(1u, position.y, position.y).x);
-        let listed = min(counts[cell], params.capacity);
-        for (var i = 0u; i < listed; i++) {
-            let near = lists[cell * params.capacity + i];
-            if near >= params.slabs {
-                continue;
-            }
-            let body = slabs[SLAB * near];
-            let middle = vec2<f32>(boxes[BOX * near], boxes[BOX * near + 1u]);
-            let low = boxes[BOX * near + 2u];
-            let high = boxes[BOX * near + 3u];
+    var full = false;
+    for (var i = 0u; i < listed; i++) {
+        let near = lists[cell * params.capacity + i];
+        if near >= params.slabs {
+            continue;
+        }
+        let body = slabs[SLAB * near];
+        let middle = vec2<f32>(boxes[BOX * near], boxes[BOX * near + 1u]);
+        let low = boxes[BOX * near + 2u];
+        let high = boxes[BOX * near + 3u];
 #if THREAD
 #else
-            if body == own {
-                continue;
-            }
-#endif
-            if position.z < low - reach || position.z > high + reach {
-                continue;
-            }
-            var image = vec2<i32>(0);
-#if PERIODIC
-            if params.period.x != 0 {
-                image.x = to_i32((position.x - middle.x) / period.x);
-            }
-            if params.period.y != 0 {
-                image.y = to_i32((position.y - middle.y) / period.y);
-            }
-            let from_middle = abs(position.xy - middle - vec2<f32>(image) * period);
-#else
-            let from_middle = abs(position.xy - middle);
-#endif
-            let room = vec2<f32>(boxes[BOX * near + 4u], boxes[BOX * near + 5u]) + reach * stretched;
-            if any(from_middle > room) {
-                continue;
-            }
-            var slice = i32(slabs[SLAB * near + 1u]);
-#if PERIODIC
-            // a closed yarn goes on through its own images: count its slices on instead
-            let turns = image.x * wrap_of(body).x + image.y * wrap_of(body).y;
-            image = image - turns * wrap_of(body);
-            slice = slice + turns * slices_of(body);
-#endif
-            let first = i32(slabs[SLAB * near + 2u]);
-            let best = best_of(slave, body, image, slice, first, reach);
-            if best.in_front.distance == FAR && best.behind.distance == FAR {
-                continue;
-            }
-            var known = 0u;
-            while known < count && found[known].key != best.key {
-                known++;
-            }
-            if known < count {
-                found[known].in_front = nearer(found[known].in_front, best.in_front);
-                found[known].behind = nearer(found[known].behind, best.behind);
-            } else if count < MOST {
-                found[count] = best;
-                count++;
-            } else {
-                atomicOr(&status[FLAGS], SLOTS_FULL);
-            }
+        if body == own {
+            continue;
         }
-    } else {
-        atomicOr(&status[FLAGS], NOT_FINITE);
+#endif
+        if position.z < low - reach || position.z > high + reach {
+            continue;
+        }
+        var image = vec2<i32>(0);
+#if PERIODIC
+        if params.period.x != 0 {
+            image.x = to_i32((position.x - middle.x) / period.x);
+        }
+        if params.period.y != 0 {
+            image.y = to_i32((position.y - middle.y) / period.y);
+        }
+        let from_middle = abs(position.xy - middle - vec2<f32>(image) * period);
+#else
+        let from_middle = abs(position.xy - middle);
+#endif
+        let room = vec2<f32>(boxes[BOX * near + 4u], boxes[BOX * near + 5u]) + reach * stretched;
+        if any(from_middle > room) {
+            continue;
+        }
+        var slice = i32(slabs[SLAB * near + 1u]);
+#if PERIODIC
+        // a closed yarn goes on through its own images: count its slices on instead
+        let turns = image.x * wrap_of(body).x + image.y * wrap_of(body).y;
+        image = image - turns * wrap_of(body);
+        slice = slice + turns * slices_of(body);
+#endif
+        let first = i32(slabs[SLAB * near + 2u]);
+        let best = best_of(slave, body, image, slice, first, reach);
+        if best.in_front.distance == FAR && best.behind.distance == FAR {
+            continue;
+        }
+        var known = 0u;
+        while known < count && found[known].key != best.key {
+            known++;
+        }
+        if known < count {
+            found[known].in_front = nearer(found[known].in_front, best.in_front);
+            found[known].behind = nearer(found[known].behind, best.behind);
+        } else if count < MOST {
+            found[count] = best;
+            count++;
+        } else {
+            full = true;
+        }
+    }
+    if full || count > params.slots {
+        atomicOr(&status[FLAGS], SLOTS_FULL);
+        return;
     }
     // sorted by key
     for (var i = 1u; i < count; i++) {
@@ -196,9 +209,6 @@ fn candidates(item: u32) {
             to--;
         }
         found[to] = best;
-    }
-    if count > params.slots {
-        atomicOr(&status[FLAGS], SLOTS_FULL);
     }
     // new candidates go into the slots; known ones keep their state, and their face while they touch
     let size = params.state;

@@ -313,13 +313,39 @@ fn walk(slave: u32, body: u32, image: vec2<i32>, from_place: Place) -> Walked {
 }
 
 #if THREAD
+// Corners at the ends of the edge that a face shares with the one it is reached from, by a step around the ring or along the
+// slices.
+fn near_edge(ring: i32, slice: i32) -> vec2<u32> {
+    if ring != 0 {
+        return select(vec2<u32>(3u, 2u), vec2<u32>(0u, 1u), ring > 0);
+    }
+    return select(vec2<u32>(1u, 2u), vec2<u32>(0u, 3u), slice > 0);
+}
+
+// More than rounding moves a distance, as a share of it.
+const FACE_ROUNDING: f32 = 1e-4;
+
+// Whether all of a face is sure to be farther from the slave than `reach`: it lies behind a plane that is so far away, across
+// the direction to the closest point of one of its edges.
+fn is_beyond(q: array<vec3<f32>, 4>, edge: vec2<u32>, reach: f32) -> bool {
+    var corners = q;
+    let start = corners[edge.x];
+    let along = corners[edge.y] - start;
+    let share = min(max(-dot(start, along) / dot(along, along), 0.0), 1.0);
+    let nearest = along * share + start;
+    let square = dot(nearest, nearest);
+    let least = min(min(dot(q[0], nearest), dot(q[1], nearest)), min(dot(q[2], nearest), dot(q[3], nearest)));
+    return least > 0.0 && least * least > reach * reach * square * (1.0 + FACE_ROUNDING);
+}
+
 // The closest face of all around the slice of one that was found: in front of an open end the two sides of a thin rim may be as
 // near as each other.
 fn around(slave: u32, body: u32, image: vec2<i32>, found: Walked) -> Walked {
     let ring = ring_of(body);
     var best = found;
     for (var step = 1; step < ring; step++) {
-        best = closer(best, slave, body, image, Place(rem_euclid(found.place.ring + step, ring), found.place.slice));
+        let place = Place(rem_euclid(found.place.ring + step, ring), found.place.slice);
+        best = closer(best, slave, body, image, place, near_edge(1, 0));
     }
     return best;
 }
@@ -335,20 +361,23 @@ fn beside(slave: u32, body: u32, image: vec2<i32>, found: Walked) -> Walked {
             if k == 1 && !rises(slave, body, image, place, next, found.point) {
                 break;
             }
-            best = closer(best, slave, body, image, next);
+            best = closer(best, slave, body, image, next, near_edge(step, 0));
         }
         let next = Place(place.ring, place.slice + step);
         if has_slice(body, next.slice) && rises(slave, body, image, place, next, found.point) {
-            best = closer(best, slave, body, image, next);
+            best = closer(best, slave, body, image, next, near_edge(0, step));
         }
     }
     best.place.ring = rem_euclid(best.place.ring, ring_of(body));
     return best;
 }
 
-// A face instead of another one if it is closer and not seen from behind.
-fn closer(best: Walked, slave: u32, body: u32, image: vec2<i32>, place: Place) -> Walked {
+// A face instead of another one if it is closer and not seen from behind; `edge` is the one on the side of that other one.
+fn closer(best: Walked, slave: u32, body: u32, image: vec2<i32>, place: Place, edge: vec2<u32>) -> Walked {
     let corners = corners(slave, body, image, place);
+    if is_beyond(corners.current, edge, best.point.distance * 1.001 + 1e-6) {
+        return best;
+    }
     let point = closest(corners.current);
     if !is_behind(point) && better_than(point, best.point) {
         return Walked(place, corners, point);
@@ -382,14 +411,14 @@ fn faces_within(all: ptr<function, Touch>, slave: u32, body: u32, image: vec2<i3
             if !border && !rises(slave, body, image, place, next, first.point) {
                 continue;
             }
-            if !add_near(all, &count, slave, body, image, next, reach, front) {
+            if !add_near(all, &count, slave, body, image, next, reach, front, near_edge(0, slice)) {
                 continue;
             }
         }
         if slice == 0 && rim {
             for (var k = 1; k < ring_of(body); k++) {
                 let next = Place(place.ring + k, place.slice);
-                add_near(all, &count, slave, body, image, next, reach, front);
+                add_near(all, &count, slave, body, image, next, reach, front, near_edge(1, 0));
             }
             continue;
         }
@@ -401,7 +430,7 @@ fn faces_within(all: ptr<function, Touch>, slave: u32, body: u32, image: vec2<i3
                 if k == 1 && !border && !rises(slave, body, image, place, beside, first.point) {
                     break;
                 }
-                if !add_near(all, &count, slave, body, image, next, reach, front) {
+                if !add_near(all, &count, slave, body, image, next, reach, front, near_edge(step, 0)) {
                     break;
                 }
             }
@@ -410,7 +439,7 @@ fn faces_within(all: ptr<function, Touch>, slave: u32, body: u32, image: vec2<i3
 }
 
 // Touches a face if it is within reach; says whether it is. Where the first one is seen from the `front`, one that is seen from
-// behind is the other side of a thin edge.
+// behind is the other side of a thin edge. `edge` is the one on the side of those that were looked at before.
 fn add_near(
     all: ptr<function, Touch>,
     count: ptr<function, u32>,
@@ -420,11 +449,15 @@ fn add_near(
     place: Place,
     reach: f32,
     front: bool,
+    edge: vec2<u32>,
 ) -> bool {
     if *count == MOST_TOUCHED {
         return false;
     }
     let corners = corners(slave, body, image, place);
+    if is_beyond(corners.current, edge, reach) {
+        return false;
+    }
     let point = closest(corners.current);
     let is_near = point.distance < reach && !(front && is_behind(point));
     if is_near {

@@ -25,6 +25,8 @@ fn clear(cell: u32) {
 const BOX: u32 = 6u;
 // Integers of a slab: body, slice, first face around the ring.
 const SLAB: u32 = 3u;
+// Bit of a cell's count: something near has moved, and candidates are searched there again.
+const MOVED_HERE: u32 = 0x80000000u;
 // Faces of a slab at most.
 const SLAB_FACES: i32 = 8;
 // More than rounding moves a place in the plane, mm: an item must not be in too few cells.
@@ -96,13 +98,15 @@ fn cell_index(x: i32, y: i32) -> u32 {
 @group(1) @binding(3) var<storage, read> slabs: array<u32>;
 @group(1) @binding(4) var<storage, read> bodies: array<u32>;
 @group(1) @binding(5) var<storage, read> ring_lines: array<u32>;
-const WRITES: u32 = 6u;
+@group(1) @binding(6) var<storage, read> moved: array<u32>;
+const WRITES: u32 = 7u;
 #else
 @group(1) @binding(3) var<storage, read> ends: array<u32>;
 @group(1) @binding(4) var<storage, read> beams: array<f32>;
 @group(1) @binding(5) var<storage, read> neighbours: array<u32>;
 @group(1) @binding(6) var<storage, read> shares: array<f32>;
-const WRITES: u32 = 7u;
+@group(1) @binding(7) var<storage, read> moved: array<u32>;
+const WRITES: u32 = 8u;
 #endif
 @group(1) @binding(WRITES) var<storage, read_write> counts: array<atomic<u32>>;
 @group(1) @binding(WRITES + 1u) var<storage, read_write> lists: array<u32>;
@@ -120,8 +124,8 @@ fn grow(bounds: Bounds, back: Inverse, v: vec3<f32>) -> Bounds {
     return Bounds(min(bounds.low, x), max(bounds.high, x));
 }
 
-// Puts an item into every cell that its box touches, `reach` around.
-fn put(item: u32, origin: u32, back: Inverse, bounds: Bounds, reach: f32) {
+// Puts an item into every cell that its box touches, `reach` around, and says there whether it has moved.
+fn put(item: u32, origin: u32, back: Inverse, bounds: Bounds, reach: f32, has_moved: bool) {
     let base = absolute(back, origin);
     let low = bounds.low;
     let high = bounds.high;
@@ -137,7 +141,10 @@ fn put(item: u32, origin: u32, back: Inverse, bounds: Bounds, reach: f32) {
     for (var y = ys.x; y <= ys.y; y++) {
         for (var x = xs.x; x <= xs.y; x++) {
             let cell = cell_index(x, y);
-            let place = atomicAdd(&counts[cell], 1u);
+            let place = atomicAdd(&counts[cell], 1u) & ~MOVED_HERE;
+            if has_moved {
+                atomicOr(&counts[cell], MOVED_HERE);
+            }
             if place < params.capacity {
                 lists[cell * params.capacity + place] = item;
             } else {
@@ -156,13 +163,15 @@ fn fill_slabs(item: u32) {
     let first = i32(slabs[SLAB * item + 2u]);
     let origin = node(body, vec2<i32>(0), Place(first, slice)).node;
     let last = min(first + SLAB_FACES, ring_of(body));
+    var has_moved = false;
     for (var ring = first; ring <= last; ring++) {
         for (var end = slice; end <= slice + 1; end++) {
             let seen = node(body, vec2<i32>(0), Place(ring, end));
             bounds = grow(bounds, back, from_slave(origin, seen).current);
+            has_moved = has_moved || moved[seen.node] == 1u;
         }
     }
-    put(item, origin, back, bounds, params.thread_radius + params.skin);
+    put(item, origin, back, bounds, params.thread_radius + params.skin, has_moved);
 }
 #endif
 
@@ -174,7 +183,9 @@ fn fill_beams(item: u32) {
     let aside = bow(beam).current;
     var bounds = grow(Bounds(vec3<f32>(0.0), vec3<f32>(0.0)), back, aside);
     bounds = grow(bounds, back, aside + (along.reference + along.change));
-    put(item, ends[2u * beam], back, bounds, 2.0 * params.thread_radius + params.skin);
+    let first = ends[2u * beam];
+    let has_moved = moved[first] == 1u || moved[ends[2u * beam + 1u]] == 1u;
+    put(item, first, back, bounds, 2.0 * params.thread_radius + params.skin, has_moved);
 }
 #endif
 #endif

@@ -228,6 +228,11 @@ fn penalty(item: u32) {
             if gap < 0.0 {
                 continue;
             }
+#if THREAD
+#else
+            // until now it was in front
+            states[s] = 0.0;
+#endif
         }
         let from_place = Place(i32(keys[k + 1u]), i32(keys[k + 2u]));
         var open = true;
@@ -274,7 +279,10 @@ fn penalty(item: u32) {
             }
         }
 #else
-        touch(&all, found.corners, point);
+        // what is behind the border of a cut end is before the end, and not in the yarn
+        if !(height(point) < 0.0 && is_rim(candidate.body, found.place, point)) {
+            touch(&all, found.corners, point);
+        }
 #endif
         let size = norm(all.push);
 #if FRICTION

@@ -112,6 +112,20 @@ fn pairs(beam: u32) {
     let ys = cells(1u, min(start.y, end.y), max(start.y, end.y));
     if !(is_finite(start.x) && is_finite(start.y)) {
         atomicOr(&status[FLAGS], NOT_FINITE);
+        return;
+    }
+    var has_moved = false;
+    var full = false;
+    for (var y = ys.x; y <= ys.y; y++) {
+        for (var x = xs.x; x <= xs.y; x++) {
+            let listed = counts[cell_index(x, y)];
+            has_moved = has_moved || (listed & MOVED_HERE) != 0u;
+            full = full || (listed & ~MOVED_HERE) > params.capacity;
+        }
+    }
+    // overflow keeps what was known, and is searched again with larger tables
+    if !has_moved || full {
+        return;
     }
     // in ascending order
     var found: array<u32, MOST_PAIRS>;
@@ -119,7 +133,7 @@ fn pairs(beam: u32) {
     for (var y = ys.x; y <= ys.y; y++) {
         for (var x = xs.x; x <= xs.y; x++) {
             let cell = cell_index(x, y);
-            let listed = min(counts[cell], params.capacity);
+            let listed = counts[cell] & ~MOVED_HERE;
             for (var i = 0u; i < listed; i++) {
                 let near = lists[cell * params.capacity + i];
                 if near < params.slabs + beam + 1u {
@@ -155,7 +169,7 @@ fn pairs(beam: u32) {
                     continue;
                 }
                 if count == MOST_PAIRS {
-                    atomicOr(&status[FLAGS], SLOTS_FULL);
+                    full = true;
                     continue;
                 }
                 for (var to = count; to > place; to--) {
@@ -167,9 +181,9 @@ fn pairs(beam: u32) {
         }
     }
     let slots = params.beam_slots;
-    if count > slots {
+    if full || count > slots {
         atomicOr(&status[FLAGS], SLOTS_FULL);
-        count = slots;
+        return;
     }
     let size = params.state;
     var old: array<u32, MOST_PAIRS>;
@@ -210,6 +224,11 @@ fn pairs(beam: u32) {
 @group(1) @binding(13) var<storage, read_write> stiffness: array<atomic<i32>>;
 @group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
 
+// Mean of the sums of the sizes of the weights of two lines.
+fn mean_weights(a: u32, b: u32) -> f32 {
+    return 0.5 * (line_weights(a) + line_weights(b));
+}
+
 fn force(beam: u32) {
     let slots = params.beam_slots;
     if keys[slots * beam] == EMPTY {
@@ -220,6 +239,23 @@ fn force(beam: u32) {
 #if FRICTION
     let tangential = params.thread_thread * params.tangential;
 #endif
+    let growth = 2.0 * params.thread_radius * row.radius_increment;
+    var can_touch = false;
+    for (var slot = 0u; slot < slots; slot++) {
+        let pair = keys[slots * beam + slot];
+        if pair == EMPTY {
+            break;
+        }
+        let s = SLOT_STATE * (slots * beam + slot);
+        if states[s] < 0.0 {
+            states[s] = states[s] + row.approach * mean_weights(beam, of_key(pair).body) * elapsed + growth;
+        }
+        can_touch = can_touch || !(states[s] < 0.0);
+    }
+    sums[SUMS * beam + SUM_ENERGY] = 0.0;
+    if !can_touch {
+        return;
+    }
     var energy = 0.0;
     var touches = false;
     let own = vector(beam);
@@ -232,6 +268,10 @@ fn force(beam: u32) {
         }
         let candidate = of_key(pair);
         let other = candidate.body;
+        let s = SLOT_STATE * (slots * beam + slot);
+        if states[s] < 0.0 {
+            continue;
+        }
         let apart = between(beam, aside, other, candidate.image);
         let theirs = vector(other);
         let direction = theirs.reference + theirs.change;
@@ -239,12 +279,11 @@ fn force(beam: u32) {
         let offset = along * st.x - (direction * st.y + apart.current);
         let distance = norm(offset);
         let depth = radius + radius - distance;
-        let s = SLOT_STATE * (slots * beam + slot);
 #if FRICTION
         let elastic = vec3<f32>(states[s + 1u], states[s + 2u], states[s + 3u]);
 #endif
         if depth <= 0.0 || distance < 1e-6 {
-            states[s] = 0.0;
+            states[s] = min(depth, 0.0);
 #if FRICTION
             add_sum(beam, SUM_FRICTION, 0.5 * tangential * dot(elastic, elastic));
             states[s + 1u] = 0.0;
@@ -274,7 +313,6 @@ fn force(beam: u32) {
         let approach = dot(motion, normal);
         let pressed = press(params.thread_thread, depth, inverse_mass, approach);
         add_sum(beam, SUM_DAMPING, (pressed.elastic_force - pressed.pressing) * approach * elapsed);
-        let growth = 2.0 * params.thread_radius * row.radius_increment;
         add_sum(beam, SUM_RADIUS, pressed.elastic_force * growth);
         states[s] = pressed.pressing;
         var stored = pressed.elastic_force * depth;
@@ -295,7 +333,7 @@ fn force(beam: u32) {
         add_virial(beam, push, rest);
 #endif
         add_pair(push, nodes, others);
-        let row_sum = 0.5 * pressed.row_sum * (line_weights(beam) + line_weights(other));
+        let row_sum = pressed.row_sum * mean_weights(beam, other);
         add_stiffness(row_sum, nodes);
         add_stiffness(row_sum, others);
         raise(PENETRATION + 2u, depth);

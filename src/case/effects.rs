@@ -67,7 +67,7 @@ pub struct Contact {
     /// Damping of the normal approach, as a share of critical. Default 0.1.
     #[schemars(range(min = 0, max = 1))]
     pub damping_ratio: f64,
-    /// Distance beyond touching at which pairs become candidates, mm. Default 0.06.
+    /// Distance beyond touching at which pairs become candidates, mm. Default 0.12.
     #[schemars(range(min = 1e-4, max = 5))]
     pub skin_mm: f64,
     /// Beams of one thread closer than this along it do not touch each other, mm. Default 0.4.
@@ -91,7 +91,7 @@ impl Default for Contact {
             friction: true,
             tangential_ratio: 0.5,
             damping_ratio: 0.1,
-            skin_mm: 0.06,
+            skin_mm: 0.12,
             self_contact_arc_mm: 0.4,
             initial_radius_ratio: 1.0,
         }

@@ -31,8 +31,8 @@ pub fn shares(before: f64, length: f64, behind: f64) -> [f64; SHARES] {
 impl<R: Real> Bows<'_, R> {
     #[inline(always)]
     fn beside(&self, beam: usize) -> ([usize; 2], [R; 2]) {
-        let at = |k: usize| NEIGHBOURS * beam + k;
-        ([0, 1].map(|k| self.neighbours[at(k)] as usize), [0, 1].map(|k| self.shares[at(k)]))
+        let (n, s) = (&self.neighbours[NEIGHBOURS * beam..][..NEIGHBOURS], &self.shares[SHARES * beam..][..SHARES]);
+        ([n[0] as usize, n[1] as usize], [s[0], s[1]])
     }
 
     /// From a beam's chord to its line, in the reference and now, mm.
@@ -46,7 +46,8 @@ impl<R: Real> Bows<'_, R> {
         gradient: &[[R; 3]; 3],
     ) -> (Vector<R>, Vector<R>) {
         let (beside, shares) = self.beside(beam);
-        let [before, behind] = beside.map(|beam| beam2::vector::<_, PERIODIC>(beams, ends, beam, w, gradient));
+        let before = beam2::vector::<_, PERIODIC>(beams, ends, beside[0], w, gradient);
+        let behind = beam2::vector::<_, PERIODIC>(beams, ends, beside[1], w, gradient);
         let part = |before, behind| sub(scale(before, shares[0]), scale(behind, shares[1]));
         let rest = part(before.0, behind.0);
         (rest, add(rest, part(before.1, behind.1)))

@@ -2,10 +2,11 @@
 //!
 //! Among the faces of a body the closest one in front of which the slave lies wins; one behind which it lies only if it is
 //! clearly closer, since at a sharp edge the slave is behind the neighbouring face without being inside the body. A
-//! candidate that was known keeps its state, and its face while it touches.
+//! candidate that was known keeps its state, and its face while it touches. Slaves near nothing that has moved keep their
+//! candidates.
 
 use super::face::{Place, Surface, closest};
-use super::grid::{BOX, SLAB, SLAB_FACES, absolute, cell_index, cells, inverse};
+use super::grid::{BOX, MOVED_HERE, SLAB, SLAB_FACES, absolute, cell_index, cells, inverse};
 use super::penalty::{SLAVE, SLAVE_VALUES, SLOT_KEYS};
 use super::{EMPTY, MOST_STATE, Params, key, status};
 use crate::kernel::lane::{Lane, Real};
@@ -28,9 +29,10 @@ pub const REMAINDER: usize = 7;
 pub const COUNTS: usize = 8;
 pub const ITEMS: usize = 9;
 pub const BOXES: usize = 10;
-const KEYS: usize = 11;
-const STATE: usize = 12;
-const STATUS: usize = 13;
+pub const MOVED: usize = 11;
+const KEYS: usize = 12;
+const STATE: usize = 13;
+const STATUS: usize = 14;
 
 /// Bodies that one slave can be near to before the search gives up.
 const MOST: usize = 16;
@@ -71,6 +73,7 @@ impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PER
         let stretch = [0, 1].map(|k| (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt());
         let (slaves, values, slabs) = (io.uints(SLAVES), io.scalars(VALUES), io.uints(SLABS));
         let (counts, lists, boxes) = (io.uints(COUNTS), io.uints(ITEMS), io.scalars(BOXES));
+        let moved = io.uints(MOVED);
         let mut keys = io.own::<u32>(KEYS);
         let mut states = io.own::<L::Scalar>(STATE);
         let flags = io.atomic_uints(STATUS);
@@ -82,99 +85,107 @@ impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PER
             let own = slaves[SLAVE * item + 1];
             let reach = values[SLAVE_VALUES * item + 1] + constant(f64::from(params.skin));
             let (position, height) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, slave);
+            if !(position[0].is_finite() && position[1].is_finite() && height.is_finite()) {
+                flags[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
+                continue;
+            }
+            let (x, _) = cells::<_, PERIODIC>(&params, 0, position[0], position[0]);
+            let (y, _) = cells::<_, PERIODIC>(&params, 1, position[1], position[1]);
+            let cell = cell_index(&params, x, y);
+            if counts[cell] & MOVED_HERE == 0 && moved[slave] == 0 {
+                continue;
+            }
+            let listed = (counts[cell] & !MOVED_HERE) as usize;
+            // overflow keeps what was known, and is searched again with larger tables
+            if listed > params.capacity as usize {
+                continue;
+            }
             let mut found = [Best { key: EMPTY, in_front: (far, nowhere), behind: (far, nowhere) }; MOST];
             let mut count = 0;
-            if position[0].is_finite() && position[1].is_finite() && height.is_finite() {
-                let (x, _) = cells::<_, PERIODIC>(&params, 0, position[0], position[0]);
-                let (y, _) = cells::<_, PERIODIC>(&params, 1, position[1], position[1]);
-                let cell = cell_index(&params, x, y);
-                let listed = counts[cell].min(params.capacity) as usize;
-                for &near in &lists[cell * params.capacity as usize..][..listed] {
-                    if near >= params.slabs {
-                        continue;
-                    }
-                    let [body, slice, first] = [0, 1, 2].map(|k| slabs[SLAB * near as usize + k]);
-                    let (slice, first) = (slice as i32, first as i32);
-                    let bounds = &boxes[BOX * near as usize..][..BOX];
-                    if !THREAD && body == own || height < bounds[2] - reach || height > bounds[3] + reach {
-                        continue;
-                    }
-                    let image = [0, 1].map(|k| {
-                        let repeats = PERIODIC && params.period[k] != 0;
-                        if repeats { ((position[k] - bounds[k]) / period[k]).to_i32() } else { 0 }
-                    });
-                    let beside = |k: usize| {
-                        let from = position[k] - bounds[k] - L::Scalar::from_i32(image[k]) * period[k];
-                        from.abs() > bounds[4 + k] + reach * stretch[k]
+            let mut full = false;
+            for &near in &lists[cell * params.capacity as usize..][..listed] {
+                if near >= params.slabs {
+                    continue;
+                }
+                let slab = &slabs[SLAB * near as usize..][..SLAB];
+                let (body, slice, first) = (slab[0], slab[1] as i32, slab[2] as i32);
+                let bounds = &boxes[BOX * near as usize..][..BOX];
+                if !THREAD && body == own || height < bounds[2] - reach || height > bounds[3] + reach {
+                    continue;
+                }
+                let image_along = |k: usize| {
+                    let repeats = PERIODIC && params.period[k] != 0;
+                    if repeats { ((position[k] - bounds[k]) / period[k]).to_i32() } else { 0 }
+                };
+                let image = [image_along(0), image_along(1)];
+                let beside = |k: usize| {
+                    let from = position[k] - bounds[k] - L::Scalar::from_i32(image[k]) * period[k];
+                    from.abs() > bounds[4 + k] + reach * stretch[k]
+                };
+                if beside(0) || beside(1) {
+                    continue;
+                }
+                // a closed yarn goes on through its own images: count its slices on instead
+                let b = surface.bodies[body as usize];
+                let turns = if PERIODIC { image[0] * b.wrap[0] + image[1] * b.wrap[1] } else { 0 };
+                let lateral = [image[0] - turns * b.wrap[0], image[1] - turns * b.wrap[1]];
+                let slice = slice + turns * b.slices as i32;
+                let key = key(body as usize, lateral);
+                let mut best = Best { key, in_front: (far, nowhere), behind: (far, nowhere) };
+                let place = |ring| Place { ring, slice };
+                let across = |ring: i32| {
+                    let end = |slice| {
+                        let (node, shift) = surface.node(body as usize, lateral, Place { ring, slice });
+                        surface.from_slave(slave, node, shift).1
                     };
-                    if beside(0) || beside(1) {
+                    (end(slice), end(slice + 1))
+                };
+                let mut here = across(first);
+                for ring in first..(first + SLAB_FACES as i32).min(b.ring as i32) {
+                    let next = across(ring + 1);
+                    let corners = [here.0, here.1, next.1, next.0];
+                    here = next;
+                    let (d1, d2) = (sub(corners[2], corners[0]), sub(corners[3], corners[1]));
+                    let middle = scale(add(add(corners[0], corners[1]), add(corners[2], corners[3])), constant(0.25));
+                    let spread = constant(0.5) * norm(d1).max(norm(d2));
+                    if norm(middle) > reach + spread * constant(1.1) {
                         continue;
                     }
-                    // a closed yarn goes on through its own images: count its slices on instead
-                    let b = surface.bodies[body as usize];
-                    let turns = if PERIODIC { image[0] * b.wrap[0] + image[1] * b.wrap[1] } else { 0 };
-                    let lateral = [image[0] - turns * b.wrap[0], image[1] - turns * b.wrap[1]];
-                    let slice = slice + turns * b.slices as i32;
-                    let key = key(body as usize, lateral);
-                    let mut best = Best { key, in_front: (far, nowhere), behind: (far, nowhere) };
-                    let place = |ring| Place { ring, slice };
-                    let across = |ring: i32| {
-                        let end = |slice| {
-                            let (node, shift) = surface.node(body as usize, lateral, Place { ring, slice });
-                            surface.from_slave(slave, node, shift).1
-                        };
-                        (end(slice), end(slice + 1))
-                    };
-                    let mut here = across(first);
-                    for ring in first..(first + SLAB_FACES as i32).min(b.ring as i32) {
-                        let next = across(ring + 1);
-                        let corners = [here.0, here.1, next.1, next.0];
-                        here = next;
-                        let (d1, d2) = (sub(corners[2], corners[0]), sub(corners[3], corners[1]));
-                        let middle =
-                            scale(add(add(corners[0], corners[1]), add(corners[2], corners[3])), constant(0.25));
-                        let spread = constant(0.5) * norm(d1).max(norm(d2));
-                        if norm(middle) > reach + spread * constant(1.1) {
-                            continue;
-                        }
-                        let point = closest(&corners);
-                        if point.distance > reach {
-                            continue;
-                        }
-                        let in_front = point.height() >= constant(0.0) || THREAD && !point.interior;
-                        if in_front {
-                            best.in_front = nearer(best.in_front, (point.distance, place(ring)));
-                        } else if point.normal_and_distance(THREAD).is_some() {
-                            best.behind = nearer(best.behind, (point.distance, place(ring)));
-                        }
-                    }
-                    if best.in_front.0 == far && best.behind.0 == far {
+                    let point = closest(&corners);
+                    if point.distance > reach {
                         continue;
                     }
-                    match found[..count].iter_mut().find(|f| f.key == key) {
-                        Some(known) => {
-                            known.in_front = nearer(known.in_front, best.in_front);
-                            known.behind = nearer(known.behind, best.behind);
-                        }
-                        None if count < MOST => {
-                            found[count] = best;
-                            count += 1;
-                        }
-                        None => {
-                            flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
-                        }
+                    let in_front = point.height() >= constant(0.0) || THREAD && !point.interior;
+                    if in_front {
+                        best.in_front = nearer(best.in_front, (point.distance, place(ring)));
+                    } else if point.normal_and_distance(THREAD).is_some()
+                        && !surface.is_rim(body as usize, place(ring), &point)
+                    {
+                        best.behind = nearer(best.behind, (point.distance, place(ring)));
                     }
                 }
-            } else {
-                flags[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
+                if best.in_front.0 == far && best.behind.0 == far {
+                    continue;
+                }
+                match found[..count].iter_mut().find(|f| f.key == key) {
+                    Some(known) => {
+                        known.in_front = nearer(known.in_front, best.in_front);
+                        known.behind = nearer(known.behind, best.behind);
+                    }
+                    None if count < MOST => {
+                        found[count] = best;
+                        count += 1;
+                    }
+                    None => full = true,
+                }
+            }
+            if full || count > params.slots as usize {
+                flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
+                continue;
             }
             let found = &mut found[..count];
             found.sort_unstable_by_key(|f| f.key);
-            if count > params.slots as usize {
-                flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
-            }
-            let kept = found.len().min(params.slots as usize);
-            merge(keys.item(0, item), states.item(0, item), params.state as usize, &found[..kept]);
+            merge(keys.item(0, item), states.item(0, item), params.state as usize, found);
         }
     }
 }

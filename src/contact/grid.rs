@@ -3,6 +3,7 @@
 //!
 //! Cells are taken in the pulled-back plane F̄⁻¹x, where the periodic cell keeps its rectangle; a distance ρ in space is at
 //! most ρ |row of F̄⁻¹| along an axis there. A cell lists its items in any order: what is chosen from them does not depend on it.
+//! Cells near an item that has moved (see [`super::travel`]) say so; candidates are searched only there.
 
 use super::bow::Bows;
 use super::face::{Place, Surface};
@@ -21,6 +22,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 pub const BOX: usize = 6;
 /// Integers of a slab: body, slice, first face around the ring.
 pub const SLAB: usize = 3;
+/// Bit of a cell's count: something near has moved, and candidates are searched there again.
+pub const MOVED_HERE: u32 = 1 << 31;
 /// Faces of a slab at most.
 pub const SLAB_FACES: usize = 8;
 /// More than rounding moves a place in the plane, mm: an item must not be in too few cells.
@@ -33,12 +36,15 @@ pub const REMAINDER: usize = 2;
 pub const SLABS: usize = 3;
 pub const BODIES: usize = 4;
 pub const RING_LINES: usize = 5;
+/// 1 for nodes that have moved since candidates around them were searched.
+const SLAB_MOVED: usize = 6;
 /// Of beams, where those of slabs are.
 pub const ENDS: usize = 3;
 pub const BEAMS: usize = 4;
 /// See [`super::bow`].
 pub const NEIGHBOURS: usize = 5;
 pub const SHARES: usize = 6;
+const BEAM_MOVED: usize = 7;
 
 /// Empties the cells.
 pub struct Clear;
@@ -84,7 +90,8 @@ pub fn absolute<R: Real>(io: &Io<R>, bindings: [usize; 3], inverse: &[[R; 2]; 2]
     let (reference, quanta, remainder) = (io.ints(reference), io.ints(quanta), io.scalars(remainder));
     let plane = remainder.len() / 3;
     let mm = |q: i32| R::from_i32(q) * R::from_f64(QUANTUM);
-    let w = [0, 1, 2].map(|k| mm(quanta[node + k * plane]) + remainder[node + k * plane]);
+    let along = |k: usize| mm(quanta[node + k * plane]) + remainder[node + k * plane];
+    let w = [along(0), along(1), along(2)];
     let back = pull_back(inverse, w);
     ([mm(reference[node]) + back[0], mm(reference[node + plane]) + back[1]], mm(reference[node + 2 * plane]) + w[2])
 }
@@ -161,9 +168,17 @@ impl<'a, R: Real> Grid<'a, R> {
         }
     }
 
-    /// Puts an item into every cell that its box touches, `reach` (mm) around.
+    /// Puts an item into every cell that its box touches, `reach` (mm) around, and says there whether it has `moved`.
     #[inline(always)]
-    fn put<const PERIODIC: bool>(&mut self, io: &Io<R>, item: usize, origin: usize, bounds: Bounds<R>, reach: R) {
+    fn put<const PERIODIC: bool>(
+        &mut self,
+        io: &Io<R>,
+        item: usize,
+        origin: usize,
+        bounds: Bounds<R>,
+        reach: R,
+        moved: bool,
+    ) {
         let Self { params, inverse, counts, lists, boxes, flags } = self;
         let Bounds { low, high } = bounds;
         let (base, height) = absolute(io, [REFERENCE, QUANTA, REMAINDER], inverse, origin);
@@ -185,7 +200,10 @@ impl<'a, R: Real> Grid<'a, R> {
         for y in y0..=y1 {
             for x in x0..=x1 {
                 let cell = cell_index(params, x, y);
-                let place = counts[cell].fetch_add(1, Ordering::Relaxed);
+                let place = counts[cell].fetch_add(1, Ordering::Relaxed) & !MOVED_HERE;
+                if moved {
+                    counts[cell].fetch_or(MOVED_HERE, Ordering::Relaxed);
+                }
                 if place < params.capacity {
                     lists.set(cell * params.capacity as usize + place as usize, item as u32);
                 } else {
@@ -202,7 +220,7 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let mut grid = Grid::new::<PERIODIC>(io, 6);
+        let mut grid = Grid::new::<PERIODIC>(io, SLAB_MOVED + 1);
         let inverse = grid.inverse;
         let surface = Surface::<_, PERIODIC> {
             bodies: bytemuck::cast_slice(io.uints(BODIES)),
@@ -212,21 +230,23 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
             gradient: &io.row.gradient,
             period: grid.params.period,
         };
-        let slabs = io.uints(SLABS);
+        let (slabs, moved) = (io.uints(SLABS), io.uints(SLAB_MOVED));
         let reach = L::Scalar::from_f64(f64::from(grid.params.thread_radius + grid.params.skin));
         for item in items {
-            let [body, slice, first] = [0, 1, 2].map(|k| slabs[SLAB * item + k]);
-            let (body, slice, first) = (body as usize, slice as i32, first as i32);
+            let slab = &slabs[SLAB * item..][..SLAB];
+            let (body, slice, first) = (slab[0] as usize, slab[1] as i32, slab[2] as i32);
             let origin = surface.node(body, [0, 0], Place { ring: first, slice }).0;
             let last = (first + SLAB_FACES as i32).min(surface.bodies[body].ring as i32);
             let mut bounds = Bounds::new();
+            let mut has_moved = false;
             for ring in first..=last {
                 for slice in [slice, slice + 1] {
                     let (node, shift) = surface.node(body, [0, 0], Place { ring, slice });
                     bounds.grow(&inverse, surface.from_slave(origin, node, shift).1);
+                    has_moved |= moved[node] == 1;
                 }
             }
-            grid.put::<PERIODIC>(io, item, origin, bounds, reach);
+            grid.put::<PERIODIC>(io, item, origin, bounds, reach, has_moved);
         }
     }
 }
@@ -237,10 +257,10 @@ impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let mut grid = Grid::new::<PERIODIC>(io, 7);
+        let mut grid = Grid::new::<PERIODIC>(io, BEAM_MOVED + 1);
         let inverse = grid.inverse;
         let displacement = Displacements::new(io, QUANTA, REMAINDER);
-        let (ends, beams) = (io.uints(ENDS), io.scalars(BEAMS));
+        let (ends, beams, moved) = (io.uints(ENDS), io.scalars(BEAMS), io.uints(BEAM_MOVED));
         let bows = Bows { neighbours: io.uints(NEIGHBOURS), shares: io.scalars(SHARES) };
         let reach = L::Scalar::from_f64(f64::from(2.0 * grid.params.thread_radius + grid.params.skin));
         for item in items {
@@ -250,7 +270,9 @@ impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
             let mut bounds = Bounds::new();
             bounds.grow(&inverse, bow);
             bounds.grow(&inverse, add(bow, add(d, change)));
-            grid.put::<PERIODIC>(io, item, ends[2 * beam] as usize, bounds, reach);
+            let (first, last) = (ends[2 * beam] as usize, ends[2 * beam + 1] as usize);
+            let has_moved = moved[first] == 1 || moved[last] == 1;
+            grid.put::<PERIODIC>(io, item, first, bounds, reach, has_moved);
         }
     }
 }

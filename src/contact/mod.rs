@@ -136,6 +136,80 @@ pub fn of_key(key: u32) -> (usize, [i32; 2]) {
     ((key >> 8) as usize, [(key >> 4 & 15) as i32 - 8, (key & 15) as i32 - 8])
 }
 
+/// A force on a slave and on the corners of a face that it touches, in quanta whose sum is zero.
+#[derive(Clone, Copy)]
+pub struct Split {
+    pub slave: [i32; 3],
+    pub corners: [[i32; 3]; 4],
+}
+
+impl Split {
+    /// A force on `slave` whose opposite acts on corners by weights; none if it is out of range, which stops the run.
+    #[inline(always)]
+    pub fn new<R: Real>(status: &[AtomicU32], force: [R; 3], quantum: R, slave: usize, weights: [R; 4]) -> Self {
+        let mut split = Self { slave: [0; 3], corners: [[0; 3]; 4] };
+        for (k, force) in force.into_iter().enumerate() {
+            let quanta = force / quantum;
+            if !is_in_range(status, quanta, slave) {
+                return split;
+            }
+            let mut rest = quanta.to_i32();
+            split.slave[k] = rest;
+            for (a, weight) in weights.into_iter().enumerate() {
+                let part = if a + 1 == weights.len() { rest } else { (quanta * weight).to_i32() };
+                rest -= part;
+                split.corners[a][k] = part.wrapping_neg();
+            }
+        }
+        split
+    }
+
+    /// Adds another force between the same nodes.
+    #[inline(always)]
+    pub fn add(&mut self, other: &Self) {
+        add_quanta(&mut self.slave, other.slave);
+        for a in 0..4 {
+            add_quanta(&mut self.corners[a], other.corners[a]);
+        }
+    }
+
+    /// Adds what acts on corners to their nodes.
+    #[inline(always)]
+    pub fn add_to_corners(&self, forces: &[AtomicI32], nodes: [usize; 4]) {
+        for (node, part) in nodes.into_iter().zip(self.corners) {
+            add_force(forces, node, part);
+        }
+    }
+}
+
+/// Adds a force in quanta to another one; like sums of atomics, it wraps around.
+#[inline(always)]
+pub fn add_quanta(to: &mut [i32; 3], quanta: [i32; 3]) {
+    for k in 0..3 {
+        to[k] = to[k].wrapping_add(quanta[k]);
+    }
+}
+
+/// Adds a force in quanta to a node.
+#[inline(always)]
+pub fn add_force(forces: &[AtomicI32], node: usize, quanta: [i32; 3]) {
+    let plane = forces.len() / 3;
+    for (k, quanta) in quanta.into_iter().enumerate() {
+        forces[node + k * plane].fetch_add(quanta, Ordering::Relaxed);
+    }
+}
+
+/// Whether a component of a force fits its integer; else names the node.
+#[inline(always)]
+fn is_in_range<R: Real>(status: &[AtomicU32], quanta: R, node: usize) -> bool {
+    let fits = quanta.abs() < R::from_i32(1 << 27);
+    if !fits {
+        status[status::FLAGS].fetch_or(status::FORCE_RANGE, Ordering::Relaxed);
+        status[status::CULPRIT].store(node as u32, Ordering::Relaxed);
+    }
+    fits
+}
+
 /// Adds a force to one node and its opposite, by weights, to others: as integers, so that the sum is exactly zero.
 #[inline(always)]
 pub fn add_pair<R: Real, const N: usize, const M: usize>(
@@ -147,12 +221,9 @@ pub fn add_pair<R: Real, const N: usize, const M: usize>(
     from: [(usize, R); M],
 ) {
     let plane = forces.len() / 3;
-    let limit = R::from_i32(1 << 27);
     for (k, force) in force.into_iter().enumerate() {
         let quanta = force / quantum;
-        if !(quanta.abs() < limit) {
-            status[status::FLAGS].fetch_or(status::FORCE_RANGE, Ordering::Relaxed);
-            status[status::CULPRIT].store(to[0].0 as u32, Ordering::Relaxed);
+        if !is_in_range(status, quanta, to[0].0) {
             return;
         }
         let mut rest = quanta.to_i32();

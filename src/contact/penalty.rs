@@ -1,9 +1,9 @@
 //! Penalty contact of slave nodes with the surfaces of yarns, every step, for the candidates of each slave that can touch: one
 //! with a gap is left alone until the gap can have closed at the largest speed there is.
 
-use super::face::{Place, Surface};
+use super::face::{Near, Place, Surface};
 use super::friction::slide;
-use super::{BODY, EMPTY, Params, add_pair, add_stiffness, of_key, slot_state, status};
+use super::{BODY, EMPTY, Params, Split, add_force, add_quanta, add_stiffness, of_key, slot_state, status};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::row::Row;
@@ -72,6 +72,16 @@ pub const LEAST_FORCE: f64 = 1e-29;
 /// Contact forces of the nodes of threads (`THREAD`) or of yarn surfaces on yarns.
 pub struct Penalty<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool>;
 
+/// The first of the faces that push a slave: friction acts there, and is added to nodes together with the normal force.
+#[derive(Clone, Copy)]
+struct First<R> {
+    motion: Vector<R>,
+    apart: Vector<R>,
+    nodes: [usize; 4],
+    weights: [R; 4],
+    split: Split,
+}
+
 /// What presses two bodies apart.
 pub struct Press<R> {
     /// Penalty times depth, N.
@@ -138,6 +148,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
         let mut sums = io.own::<L::Scalar>(SUM);
         let (forces, stiffness, flags) = (io.atomics(FORCE), io.atomics(STIFFNESS), io.atomic_uints(STATUS));
         let elapsed = io.row.dt_mid + io.row.dt_mid - io.row.dt;
+        let mut near = Near::none();
         for item in items {
             let slot_keys = keys.item(0, item);
             if slot_keys[0] == EMPTY {
@@ -151,6 +162,8 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
             let sum = sums.item(0, item);
             let mut energy = zero;
             let mut touches = false;
+            // what acts on the slave is added to it once
+            let (mut own_force, mut own_row_sum) = ([0i32; 3], 0i32);
             for slot in 0..slots {
                 let at = &mut slot_keys[SLOT_KEYS * slot..][..SLOT_KEYS];
                 if at[0] == EMPTY {
@@ -162,6 +175,10 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                     state[0] = state[0] + closing;
                     if state[0] < zero {
                         continue;
+                    }
+                    if !THREAD {
+                        // until now it was in front
+                        state[0] = zero;
                     }
                 }
                 let from = Place { ring: at[1] as i32, slice: at[2] as i32 };
@@ -188,11 +205,13 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                 }
                 let enters = open && moves && state[0] <= zero;
                 let before = state[0].max(zero) / penalty;
-                let (near, single);
-                let faces = if inside {
+                let single;
+                // what is behind the border of a cut end is before the end, and not in the yarn
+                let before_end = !THREAD && point.height() < zero && surface.is_rim(body, place, &point);
+                let faces = if inside || before_end {
                     &[][..]
                 } else if THREAD && point.distance < radius {
-                    near = surface.faces_within(slave, body, image, place, (corners, point), radius);
+                    surface.faces_within(slave, body, image, place, (corners, point), radius, &mut near);
                     &near.faces[..near.count]
                 } else {
                     single = [(corners, point)];
@@ -201,7 +220,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                 // the normal forces of all faces, and where the closest one is
                 let mut push = [zero; 3];
                 let mut normal_force = zero;
-                let mut first = None;
+                let mut first: Option<First<_>> = None;
                 let mut came_in = false;
                 for (corners, point) in faces {
                     let Some((normal, distance)) = point.normal_and_distance(THREAD) else { continue };
@@ -239,17 +258,25 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                     if PERIODIC {
                         add_virial(&mut sum[virial..], force, apart);
                     }
-                    let masters = [0, 1, 2, 3].map(|a| (corners.nodes[a], weights[a]));
-                    let one = (slave, constant(1.0));
-                    add_pair(forces, flags, force, real(params.force_quantum), [one], masters);
-                    let nodes = masters.into_iter().chain([one]);
-                    add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes);
+                    let split = Split::new(flags, force, real(params.force_quantum), slave, weights);
+                    if first.is_none() {
+                        first = Some(First { motion, apart, nodes: corners.nodes, weights, split });
+                    } else {
+                        add_quanta(&mut own_force, split.slave);
+                        split.add_to_corners(forces, corners.nodes);
+                    }
+                    let stiffness_quantum = real(params.stiffness_quantum);
+                    add_stiffness(stiffness, row_sum, stiffness_quantum, corners.nodes.into_iter().zip(weights));
+                    own_row_sum = own_row_sum.wrapping_add((row_sum / stiffness_quantum).to_i32());
                     raise(&flags[status::PENETRATION[usize::from(!THREAD)]], depth);
-                    first = first.or(Some((motion, apart, masters)));
                 }
                 let size = norm(push);
                 let tangential = penalty * real(params.tangential);
-                let Some((motion, apart, masters)) = first.filter(|_| size > zero) else {
+                let Some(First { motion, apart, nodes, weights, mut split }) = first.filter(|_| size > zero) else {
+                    if let Some(first) = &first {
+                        add_quanta(&mut own_force, first.split.slave);
+                        first.split.add_to_corners(forces, first.nodes);
+                    }
                     if FRICTION {
                         let elastic = [state[1], state[2], state[3]];
                         sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
@@ -280,9 +307,14 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                     if PERIODIC {
                         add_virial(&mut sum[virial..], force, apart);
                     }
-                    let one = (slave, constant(1.0));
-                    add_pair(forces, flags, force, real(params.force_quantum), [one], masters);
+                    split.add(&Split::new(flags, force, real(params.force_quantum), slave, weights));
                 }
+                add_quanta(&mut own_force, split.slave);
+                split.add_to_corners(forces, nodes);
+            }
+            if own_row_sum != 0 || own_force != [0; 3] {
+                add_force(forces, slave, own_force);
+                stiffness[slave].fetch_add(own_row_sum, Ordering::Relaxed);
             }
             sum[SUM_ENERGY] = energy;
             if touches {

@@ -1,12 +1,15 @@
 //! Contact of beams with beams: closest points of two segments, the beams' lines (see [`super::bow`]), penalty and friction as
 //! for faces.
 //!
+//! A pair with a gap is left alone until the gap can have closed, as in [`super::penalty`]: points of lines move at most as fast as
+//! nodes times the sum of their weights.
+//!
 //! Every pair within reach counts, also where two beams of a thread are near with their common end: the distance of each
 //! pair is continuous, so the energy is, and nothing is gained as a contact passes from beam to beam.
 
 use super::bow::Bows;
 use super::friction::slide;
-use super::grid::{BOX, absolute, cell_index, cells, inverse, pull_back};
+use super::grid::{BOX, MOVED_HERE, absolute, cell_index, cells, inverse, pull_back};
 use super::penalty::{Press, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, press, virial};
 use super::{EMPTY, MOST_STATE, Params, add_pair, add_stiffness, key, of_key, slot_state, status};
 use crate::elements::beam2;
@@ -81,7 +84,11 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
     fn between(&self, a: usize, bow: &(Vector<R>, Vector<R>), b: usize, image: [i32; 2]) -> (Vector<R>, Vector<R>) {
         let other = self.bow(b);
         let (a, b) = (self.ends[2 * a] as usize, self.ends[2 * b] as usize);
-        let shift = if PERIODIC { [0, 1].map(|k| image[k].wrapping_mul(self.period[k])) } else { [0; 2] };
+        let shift = if PERIODIC {
+            [image[0].wrapping_mul(self.period[0]), image[1].wrapping_mul(self.period[1])]
+        } else {
+            [0; 2]
+        };
         let rest: Vector<R> = self.reference.between(b, a, shift);
         let affine = if PERIODIC { add(rest, apply(self.gradient, rest)) } else { rest };
         let now = add(affine, self.displacement.between(b, a));
@@ -142,9 +149,6 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
         let reach = constant(f64::from(2.0 * params.thread_radius + params.skin));
         let slots = params.beam_slots as usize;
         for beam in items {
-            // in ascending order
-            let mut found = [EMPTY; MOST_PAIRS];
-            let mut count = 0;
             let middle = |item: usize, k: usize| boxes[BOX * item + k];
             let (_, along) = scene.vector(beam);
             let bow = scene.bow(beam);
@@ -158,11 +162,27 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
             let ((x0, x1), (y0, y1)) = (range(0), range(1));
             if !(start[0].is_finite() && start[1].is_finite()) {
                 flags[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
+                continue;
             }
+            let (mut has_moved, mut full) = (false, false);
+            for y in y0..=y1 {
+                for x in x0..=x1 {
+                    let listed = counts[cell_index(&params, x, y)];
+                    has_moved |= listed & MOVED_HERE != 0;
+                    full |= listed & !MOVED_HERE > params.capacity;
+                }
+            }
+            // overflow keeps what was known, and is searched again with larger tables
+            if !has_moved || full {
+                continue;
+            }
+            // in ascending order
+            let mut found = [EMPTY; MOST_PAIRS];
+            let mut count = 0;
             for y in y0..=y1 {
                 for x in x0..=x1 {
                     let cell = cell_index(&params, x, y);
-                    let listed = counts[cell].min(params.capacity) as usize;
+                    let listed = (counts[cell] & !MOVED_HERE) as usize;
                     for &near in &lists[cell * params.capacity as usize..][..listed] {
                         if near < params.slabs + beam as u32 + 1 {
                             continue;
@@ -177,13 +197,14 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
                                 continue;
                             }
                         }
-                        let image = [0, 1].map(|k| {
+                        let image_along = |k: usize| {
                             if !PERIODIC || params.period[k] == 0 {
                                 return 0;
                             }
                             let apart = middle(params.slabs as usize + beam, k) - middle(near as usize, k);
                             (apart / period[k]).to_i32()
-                        });
+                        };
+                        let image = [image_along(0), image_along(1)];
                         let (_, apart) = scene.between(beam, &bow, other, image);
                         let (_, direction) = scene.vector(other);
                         let (s, t) = closest_points(along, direction, apart);
@@ -197,7 +218,7 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
                             continue;
                         }
                         if count == MOST_PAIRS {
-                            flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
+                            full = true;
                             continue;
                         }
                         found.copy_within(place..count, place + 1);
@@ -206,9 +227,9 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
                     }
                 }
             }
-            if count > slots {
+            if full || count > slots {
                 flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
-                count = slots;
+                continue;
             }
             let (keys, states) = (keys.item(0, beam), states.item(0, beam));
             let size = params.state as usize;
@@ -250,6 +271,7 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
         let mut sums = io.own::<L::Scalar>(11);
         let (forces, stiffness, flags) = (io.atomics(12), io.atomics(13), io.atomic_uints(14));
         let radius = real(params.thread_radius) * io.row.radius;
+        let growth = constant(2.0) * real(params.thread_radius) * io.row.radius_increment;
         let elapsed = io.row.dt_mid + io.row.dt_mid - io.row.dt;
         for beam in items {
             let slot_keys = keys.item(0, beam);
@@ -258,11 +280,28 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
             }
             let slot_states = states.item(0, beam);
             let sum = sums.item(0, beam);
+            let count = slot_keys.iter().position(|key| *key == EMPTY).unwrap_or(slot_keys.len());
+            let weights = scene.bows.line_weights(beam);
+            let mean_weights = |other| constant(0.5) * (weights + scene.bows.line_weights(other));
+            let mut can_touch = false;
+            for (key, state) in slot_keys[..count].iter().zip(slot_states.chunks_exact_mut(state_size)) {
+                if state[0] < zero {
+                    state[0] = state[0] + io.row.approach * mean_weights(of_key(*key).0) * elapsed + growth;
+                }
+                can_touch |= !(state[0] < zero);
+            }
+            sum[SUM_ENERGY] = zero;
+            if !can_touch {
+                continue;
+            }
             let mut energy = zero;
             let mut touches = false;
             let (rest, along) = scene.vector(beam);
             let bow = scene.bow(beam);
-            for (slot, key) in slot_keys.iter().enumerate().take_while(|(_, key)| **key != EMPTY) {
+            for (key, state) in slot_keys[..count].iter().zip(slot_states.chunks_exact_mut(state_size)) {
+                if state[0] < zero {
+                    continue;
+                }
                 let (other, image) = of_key(*key);
                 let (apart_rest, apart) = scene.between(beam, &bow, other, image);
                 let (direction_rest, direction) = scene.vector(other);
@@ -272,13 +311,13 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
                 let depth = radius + radius - distance;
                 let penalty = real(params.thread_thread);
                 let tangential = penalty * real(params.tangential);
-                let state = &mut slot_states[state_size * slot..][..state_size];
                 if depth <= zero || distance < constant(1e-6) {
                     if FRICTION {
                         let elastic = [state[1], state[2], state[3]];
                         sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
                     }
                     state.fill(zero);
+                    state[0] = depth.min(zero);
                     continue;
                 }
                 touches = true;
@@ -303,7 +342,6 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
                 let Press { elastic_force, pressing: normal_force, row_sum } =
                     press(&params, io.row, penalty, depth, inverse, approach);
                 sum[SUM_DAMPING] = sum[SUM_DAMPING] + (elastic_force - normal_force) * approach * elapsed;
-                let growth = constant(2.0) * real(params.thread_radius) * io.row.radius_increment;
                 sum[SUM_RADIUS] = sum[SUM_RADIUS] + elastic_force * growth;
                 state[0] = normal_force;
                 let mut stored = elastic_force * depth;
@@ -323,8 +361,7 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
                     add_virial(&mut sum[virial..], force, between);
                 }
                 add_pair(forces, flags, force, real(params.force_quantum), nodes, others);
-                let weights = scene.bows.line_weights(beam) + scene.bows.line_weights(other);
-                let row_sum = constant(0.5) * row_sum * weights;
+                let row_sum = row_sum * mean_weights(other);
                 add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes.into_iter().chain(others));
                 raise(&flags[status::PENETRATION[2]], depth);
             }

@@ -5,79 +5,88 @@ use super::position::{QUANTUM, difference};
 use super::stage::Io;
 use super::vector::Vector;
 
+/// Three planes of a buffer. They have one length, so that a node is compared with it once for all three.
+#[derive(Clone, Copy)]
+struct Planes<'a, T> {
+    values: [&'a [T]; 3],
+}
+
+impl<'a, T: Copy> Planes<'a, T> {
+    #[inline(always)]
+    fn new(all: &'a [T]) -> Self {
+        let plane = all.len() / 3;
+        let (x, rest) = all.split_at(plane);
+        let (y, rest) = rest.split_at(plane);
+        Self { values: [x, y, &rest[..plane]] }
+    }
+
+    #[inline(always)]
+    fn at(&self, node: usize) -> [T; 3] {
+        let [x, y, z] = self.values;
+        [x[node], y[node], z[node]]
+    }
+}
+
 /// Displacements: quanta and remainders.
 #[derive(Clone, Copy)]
 pub struct Displacements<'a, R> {
-    quanta: &'a [i32],
-    remainder: &'a [R],
-    plane: usize,
+    quanta: Planes<'a, i32>,
+    remainder: Planes<'a, R>,
 }
 
 impl<'a, R: Real> Displacements<'a, R> {
     /// From the bindings of a kernel.
     #[inline(always)]
     pub fn new(io: &'a Io<R>, quanta: usize, remainder: usize) -> Self {
-        let (quanta, remainder) = (io.ints(quanta), io.scalars(remainder));
-        Self { quanta, remainder, plane: remainder.len() / 3 }
+        Self { quanta: Planes::new(io.ints(quanta)), remainder: Planes::new(io.scalars(remainder)) }
     }
 
     /// Displacement of `a` less that of `b`, mm.
     #[inline(always)]
     pub fn between(&self, a: usize, b: usize) -> Vector<R> {
-        let mut d = [R::from_f64(0.0); 3];
-        for (k, d) in d.iter_mut().enumerate() {
-            let (a, b) = (a + k * self.plane, b + k * self.plane);
-            *d = difference(self.quanta[a], self.remainder[a], self.quanta[b], self.remainder[b]);
-        }
-        d
+        let (qa, ra, qb, rb) = (self.quanta.at(a), self.remainder.at(a), self.quanta.at(b), self.remainder.at(b));
+        let d = |k: usize| difference(qa[k], ra[k], qb[k], rb[k]);
+        [d(0), d(1), d(2)]
     }
 }
 
 /// A vector field on nodes.
 #[derive(Clone, Copy)]
 pub struct Field<'a, R> {
-    values: &'a [R],
-    plane: usize,
+    values: Planes<'a, R>,
 }
 
 impl<'a, R: Real> Field<'a, R> {
     /// From a binding of a kernel.
     #[inline(always)]
     pub fn new(io: &'a Io<R>, index: usize) -> Self {
-        let values = io.scalars(index);
-        Self { values, plane: values.len() / 3 }
+        Self { values: Planes::new(io.scalars(index)) }
     }
 
     #[inline(always)]
     pub fn at(&self, node: usize) -> Vector<R> {
-        [self.values[node], self.values[node + self.plane], self.values[node + 2 * self.plane]]
+        self.values.at(node)
     }
 }
 
 /// Whole quanta per node (reference positions).
 #[derive(Clone, Copy)]
 pub struct Lattice<'a> {
-    quanta: &'a [i32],
-    plane: usize,
+    quanta: Planes<'a, i32>,
 }
 
 impl<'a> Lattice<'a> {
     /// From a binding of a kernel.
     #[inline(always)]
     pub fn new<R: Real>(io: &'a Io<R>, index: usize) -> Self {
-        let quanta = io.ints(index);
-        Self { quanta, plane: quanta.len() / 3 }
+        Self { quanta: Planes::new(io.ints(index)) }
     }
 
     /// Reference position of `a` less that of `b`, plus whole quanta `shift` along x and y, mm.
     #[inline(always)]
     pub fn between<R: Real>(&self, a: usize, b: usize, shift: [i32; 2]) -> Vector<R> {
-        let shift = [shift[0], shift[1], 0];
-        let mut d = [R::from_f64(0.0); 3];
-        for (k, d) in d.iter_mut().enumerate() {
-            let (a, b) = (self.quanta[a + k * self.plane], self.quanta[b + k * self.plane]);
-            *d = R::from_i32(a.wrapping_sub(b).wrapping_add(shift[k])) * R::from_f64(QUANTUM);
-        }
-        d
+        let (a, b, shift) = (self.quanta.at(a), self.quanta.at(b), [shift[0], shift[1], 0]);
+        let d = |k: usize| R::from_i32(a[k].wrapping_sub(b[k]).wrapping_add(shift[k])) * R::from_f64(QUANTUM);
+        [d(0), d(1), d(2)]
     }
 }

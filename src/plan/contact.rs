@@ -49,6 +49,8 @@ pub(super) struct ContactScene<'a> {
     pub velocity: Buffer,
     pub mass: Buffer,
     pub status: Buffer,
+    /// Nodes that have moved, in a scene that searches.
+    pub moved: Option<Buffer>,
     pub ends: Buffer,
     pub beams: Buffer,
 }
@@ -127,7 +129,8 @@ impl ContactScene<'_> {
         let bodies = b.indices("bodies", bytemuck::cast_slice(&surfaces.bodies).to_vec());
         let rings = b.indices("ring lines", surfaces.ring_lines.clone());
         let slabs = b.indices("slabs", surfaces.slabs.clone());
-        let reads = [&self.place()[..], &[slabs, bodies, rings]].concat();
+        let mut reads = [&self.place()[..], &[slabs, bodies, rings]].concat();
+        reads.extend(self.moved);
         let kernel = flagged!(grid::FillSlabs; self.active.periodic);
         let count = surfaces.slabs.len() / grid::SLAB;
         let stage = coded(kernel, "yarns to grid", count, 32, &reads, &self.to_grid(search), params);
@@ -138,7 +141,8 @@ impl ContactScene<'_> {
     /// Threads in the grid, behind the slabs of yarns.
     fn beams_to_grid(&self, b: &mut Builder, search: &Search, slabs: usize, bows: [Buffer; 2], params: Params) {
         let beams = self.threads.thread.len();
-        let reads = [&self.place()[..], &[self.ends, self.beams], &bows].concat();
+        let mut reads = [&self.place()[..], &[self.ends, self.beams], &bows].concat();
+        reads.extend(self.moved);
         let kernel = flagged!(grid::FillBeams; self.active.periodic);
         let stage = coded(kernel, "threads to grid", beams, 32, &reads, &self.to_grid(search), params);
         // what fills the grid may run side by side
@@ -165,12 +169,13 @@ impl ContactScene<'_> {
         let sums = b.scratch("contact sums", penalty::sums(friction, periodic) * count);
         let keys_own = (keys, own(1, penalty::SLOT_KEYS * slots));
         let state_own = (state, own(1, size * slots));
-        let near = [
+        let mut near = [
             &[slaves, values, tables.slabs, tables.bodies, tables.rings][..],
             &self.place(),
             &[search.counts, search.lists, search.boxes],
         ]
         .concat();
+        near.extend(self.moved);
         let found = [keys_own, state_own, self.status()];
         let touched =
             [&[slaves, values, tables.bodies, tables.rings][..], &self.place(), &[self.velocity, self.mass]].concat();

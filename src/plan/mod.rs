@@ -99,6 +99,8 @@ pub struct Buffers {
     /// What contact-aware mass adds, tonne.
     pub added_mass: Option<Buffer>,
     pub status: Buffer,
+    /// 1 for nodes that have moved since candidates around them were searched.
+    pub moved: Option<Buffer>,
     pub hex_energy: Option<Buffer>,
     pub beam_tension: Option<Buffer>,
     pub bend_energy: Option<Buffer>,
@@ -302,11 +304,16 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         let quanta = b.add("quanta at the last search", Kind::Int, 3 * nodes, true, Initial::Zero);
         [quanta, b.add("remainder at the last search", Kind::Scalar, 3 * nodes, true, Initial::Zero)]
     });
+    // all of them at the start
+    let moved = searched.map(|_| b.indices("moved", vec![1; nodes]));
     let mut reads = vec![quanta_, remainder, velocity];
     reads.extend(searched.into_iter().flatten());
     let kernel = flagged!(travel::Travel; active.searches());
-    let writes = [(status_, Access::Atomic)];
-    b.plan.watch.push(waiting(coded(kernel, "travel", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0])));
+    let mut writes: Vec<_> = moved.map(|moved| (moved, own(1, 1))).into_iter().collect();
+    writes.push((status_, Access::Atomic));
+    let skin = effects.contact.as_ref().map_or(0.0, |c| c.skin_mm);
+    let params = travel::Params { moved: (travel::SKIN_MOVED * skin) as f32 };
+    b.plan.watch.push(waiting(coded(kernel, "travel", nodes, NODE_GRAIN, &reads, &writes, params)));
 
     // contact
     let contact = effects.contact.as_ref().filter(|_| active.searches() || active.ties).map(|chosen| {
@@ -325,14 +332,15 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             velocity,
             mass,
             status: status_,
+            moved,
             ends,
             beams: beam_table,
         };
         scene.add(&mut b)
     });
-    if let Some([search_quanta, search_remainder]) = searched {
+    if let (Some([search_quanta, search_remainder]), Some(moved)) = (searched, moved) {
         let writes = [(search_quanta, own(3, 1)), (search_remainder, own(3, 1))];
-        let reads = [quanta_, remainder];
+        let reads = [quanta_, remainder, moved];
         b.plan.search.push(after::<travel::Remember>("remember", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0]));
     }
 
@@ -484,11 +492,11 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         added_mass,
     };
     let (totals, slip) = totals::add(&mut b, &sources);
-    let moved = |stage: &&Stage| {
+    let sees_motion = |stage: &&Stage| {
         let taken = |buffer| Some(buffer) == work || Some(buffer) == reaction_work;
         stage.reads.contains(&velocity) || stage.writes.iter().any(|(buffer, _)| taken(*buffer))
     };
-    let collect_motion = b.plan.collect.iter().filter(moved).cloned().collect();
+    let collect_motion = b.plan.collect.iter().filter(sees_motion).cloned().collect();
     let mut hex_at = vec![0; hexes * LANES];
     for (hex, (block, lane)) in solids.place.iter().enumerate() {
         hex_at[block * LANES + lane] = hex;
@@ -507,6 +515,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             correction,
             added_mass,
             status: status_,
+            moved,
             hex_energy: hex.energy,
             beam_tension,
             bend_energy: bent.as_ref().map(|bent| bent.energy),

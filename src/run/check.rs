@@ -22,9 +22,9 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
     let (dt, end) = (probe.dt(), probe.schedule.end());
     // a few steps for the expected time; the first burst warms up
     probe.advance(16.0 * dt, |_| false)?;
-    let before = probe.backend().timings();
+    let before = probe.timings();
     let per_step = step_time(&mut probe, 64, wall)?;
-    let stages = since(&before, probe.backend().timings());
+    let stages = since(&before, probe.timings());
     let found = effects(loaded, &probe);
     let settled = loaded
         .case

@@ -43,7 +43,7 @@ impl Run<'_> {
             "retries": self.retries.guards(),
             "contact_searches": s.searches(),
             "wall_s": self.wall(),
-            "stage_wall_s": s.backend().timings().into_iter().map(|(name, t)| json!({"stage": name, "s": t})).collect::<Vec<_>>(),
+            "stage_wall_s": s.timings().into_iter().map(|(name, t)| json!({"stage": name, "s": t})).collect::<Vec<_>>(),
             "added_mass": {
                 "floor_solids": floor(0..first),
                 "floor_threads": floor(first..s.mesh.nodes.len()),
