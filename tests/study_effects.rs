@@ -65,7 +65,7 @@ fn explain_names_every_effect_with_what_called_for_it_and_its_share() {
     };
     for (effect, cause) in [
         ("thread-yarn contact", "effects.contact.thread_yarn by default; "),
-        ("yarn-yarn contact", "nodes of yarns are closer than 0.06 mm to another yarn"),
+        ("yarn-yarn contact", "nodes of yarns are closer than 0.12 mm to another yarn"),
         ("thread-thread contact", "beams are closer"),
         ("friction", "fabric.friction = 0.2"),
         ("contact damping", "effects.contact.damping_ratio by default"),
