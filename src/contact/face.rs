@@ -261,29 +261,21 @@ impl<R: Real> Near<R> {
 }
 
 impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
-    /// All faces within `reach` (mm) of the slave, the closest one first, found by spreading from it; in front of an open end, all
-    /// around its rim.
+    /// All faces within `reach` (mm) of the slave, found by spreading from the closest one, which is in the first place of `near`
+    /// already; in front of an open end, all around its rim.
     ///
     /// Each keeps its own distance, whether its inside, edge or corner is closest: the sum of their penalties is an energy
     /// without jumps, also where a thread lies in a fold of a crushed surface or passes an edge. The closest face alone
     /// would change its normal there from step to step.
     #[inline(always)]
-    pub fn faces_within(
-        &self,
-        slave: usize,
-        body: usize,
-        image: [i32; 2],
-        place: Place,
-        first: (Corners<R>, Closest<R>),
-        reach: R,
-        near: &mut Near<R>,
-    ) {
+    pub fn faces_within(&self, slave: usize, body: usize, image: [i32; 2], place: Place, reach: R, near: &mut Near<R>) {
+        let first = near.faces[0];
         let b = self.bodies[body];
         let wide = b.ring as i32 > 2 * RING_REACH;
         let (touches_back, touches_on) = borders_within(&first.0, &first.1, reach);
         let steps = [(-1, touches_back.0), (1, touches_on.0)];
         let rim = self.is_rim(body, place, &first.1);
-        (near.count, near.faces[0]) = (1, first);
+        near.count = 1;
         // around the ring, as long as faces are near; then the same in the slices before and after
         for slice in [0, -1, 1] {
             if !self.has_slice(body, place.slice + slice) {

@@ -211,7 +211,8 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
                 let faces = if inside || before_end {
                     &[][..]
                 } else if THREAD && point.distance < radius {
-                    surface.faces_within(slave, body, image, place, (corners, point), radius, &mut near);
+                    near.faces[0] = (corners, point);
+                    surface.faces_within(slave, body, image, place, radius, &mut near);
                     &near.faces[..near.count]
                 } else {
                     single = [(corners, point)];
