@@ -299,6 +299,18 @@ fn shipped_fabrics_build_and_report() {
     }
 }
 
+/// Wherever nodes come to lie, no thread starts in touch with a yarn: the contact would throw it away.
+#[test]
+fn shipped_threads_start_clear_of_yarns() {
+    let shipped: Value = serde_json::from_str(include_str!("../cases/fabrics/px35.json")).unwrap();
+    for beams in [30, 36, 42, 50, 60, 72, 84, 90, 120, 168] {
+        let mesh = made(with(case(), &[("/resolution", json!({ "beams_per_lap": beams }))]), shipped.clone()).unwrap();
+        let gaps = [Ply::Warp, Ply::Weft].map(|ply| thread_yarn(&mesh, ply, 1).unwrap().gap);
+        println!("{beams} beams a lap: nodes {gaps:.4?} mm from warp and weft");
+        assert!(gaps.iter().all(|gap| *gap > 0.008), "{beams}: {gaps:?}");
+    }
+}
+
 #[test]
 fn narrow_gaps_need_a_smaller_radius_at_first() {
     let tight = || with(fabric(0.18, 0.01), &[("/warp/width_mm", json!(4.9)), ("/warp/thickness_mm", json!(0.37))]);

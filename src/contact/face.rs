@@ -1,6 +1,6 @@
 //! A face of a structured surface seen from a slave point: closest point on a bilinear patch, and the walk over the surface.
 
-use super::Body;
+use super::{Body, shift};
 use crate::kernel::lane::Real;
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::vector::{Vector, add, apply, cross, dot, fma, norm, scale, sub};
@@ -78,12 +78,7 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
             slice -= turns * b.slices as i32;
             image = [image[0] + turns * b.wrap[0], image[1] + turns * b.wrap[1]];
         }
-        let shift = if PERIODIC {
-            [image[0].wrapping_mul(self.period[0]), image[1].wrapping_mul(self.period[1])]
-        } else {
-            [0; 2]
-        };
-        (slice as usize, shift)
+        (slice as usize, shift::<PERIODIC>(self.period, image))
     }
 
     /// Whether a slice of faces is on a body.

@@ -136,6 +136,12 @@ pub fn of_key(key: u32) -> (usize, [i32; 2]) {
     ((key >> 8) as usize, [(key >> 4 & 15) as i32 - 8, (key & 15) as i32 - 8])
 }
 
+/// Where an image lies, in quanta along x and y.
+#[inline(always)]
+pub fn shift<const PERIODIC: bool>(period: [i32; 2], image: [i32; 2]) -> [i32; 2] {
+    if PERIODIC { [image[0].wrapping_mul(period[0]), image[1].wrapping_mul(period[1])] } else { [0; 2] }
+}
+
 /// A force on a slave and on the corners of a face that it touches, in quanta whose sum is zero.
 #[derive(Clone, Copy)]
 pub struct Split {

@@ -11,7 +11,7 @@ use super::bow::Bows;
 use super::friction::slide;
 use super::grid::{BOX, MOVED_HERE, absolute, cell_index, cells, inverse, pull_back};
 use super::penalty::{Press, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, press, virial};
-use super::{EMPTY, MOST_STATE, Params, add_pair, add_stiffness, key, of_key, slot_state, status};
+use super::{EMPTY, MOST_STATE, Params, add_pair, add_stiffness, key, of_key, shift, slot_state, status};
 use crate::elements::beam2;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
@@ -84,12 +84,7 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
     fn between(&self, a: usize, bow: &(Vector<R>, Vector<R>), b: usize, image: [i32; 2]) -> (Vector<R>, Vector<R>) {
         let other = self.bow(b);
         let (a, b) = (self.ends[2 * a] as usize, self.ends[2 * b] as usize);
-        let shift = if PERIODIC {
-            [image[0].wrapping_mul(self.period[0]), image[1].wrapping_mul(self.period[1])]
-        } else {
-            [0; 2]
-        };
-        let rest: Vector<R> = self.reference.between(b, a, shift);
+        let rest: Vector<R> = self.reference.between(b, a, shift::<PERIODIC>(self.period, image));
         let affine = if PERIODIC { add(rest, apply(self.gradient, rest)) } else { rest };
         let now = add(affine, self.displacement.between(b, a));
         (add(rest, sub(other.0, bow.0)), add(now, sub(other.1, bow.1)))

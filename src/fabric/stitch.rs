@@ -145,20 +145,48 @@ impl Layout {
         Ok(0.5 * (low + high))
     }
 
+    /// Point of a leg that turns around the other one between the height `turn` and the middle of the weft, `t` from 0 to 1.
+    fn turning(&self, turn: f64, side: f64, lead: f64, t: f64) -> Vector {
+        let share = smooth(t);
+        let angle = FRAC_PI_2 * share;
+        let xi = side * self.half_legs * sin(angle) - self.shift * (1.0 - share);
+        [xi, lead * self.half_legs * cos(angle), turn + (self.middle[1] - turn) * t]
+    }
+
+    /// Height where legs begin to turn around each other: a little above the lower corner of the warp, or as far below that
+    /// they keep their distance from it; at the lowest half way to the weft.
+    fn turn(&self) -> f64 {
+        let corner = [(self.pitch[0] - self.warp.width) / 2.0, self.middle[0] - self.warp.edge()];
+        let is_clear = |turn: f64| {
+            (0..=200)
+                .map(|i| self.turning(turn, -1.0, 1.0, f64::from(i) / 200.0))
+                .all(|[xi, _, z]| libm::hypot(corner[0] + xi, (corner[1] - z).max(0.0)) >= 0.995 * self.stand_off)
+        };
+        let [mut high, mut low] =
+            [self.middle[0] - 0.9 * self.warp.edge(), 0.5 * (corner[1] + self.middle[1] + self.weft.edge())];
+        if is_clear(high) {
+            return high;
+        }
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if is_clear(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    }
+
     /// Half of a loop from the top of a leg to the middle of the head, `[ξ, η, z]` with ξ from the wale outwards and η from
     /// the course. `side` is that of the leg along x at the weft, `lead` that along y at the warp.
     fn leg(&self, side: f64, lead: f64) -> Result<Vec<Vector>> {
         let [rho, bend, shift, pitch] = [self.half_legs, self.bend, self.shift, self.pitch[1]];
         let [warp, weft] = self.middle;
         let head = self.head_plane();
-        let [top, turn] = [warp + self.warp.edge(), warp - 0.9 * self.warp.edge()];
+        let [top, turn] = [warp + self.warp.edge(), self.turn()];
         let mut path: Vec<Vector> = sweep(top - turn, top, turn, |z| [-shift, lead * rho, z]).collect();
-        path.extend(sweep(turn - weft, 0.0, 1.0, |t| {
-            let share = smooth(t);
-            let angle = FRAC_PI_2 * share;
-            let xi = side * rho * sin(angle) - shift * (1.0 - share);
-            [xi, lead * rho * cos(angle), turn + (weft - turn) * t]
-        }));
+        path.extend(sweep(turn - weft, 0.0, 1.0, |t| self.turning(turn, side, lead, t)));
         path.extend(sweep(weft - head, weft, head, |z| [side * rho, 0.0, z]));
         // The flank of the loop: it widens from the distance of the legs to the width of the head.
         let xi = |eta: f64| side * (rho + bend * smooth((eta - bend) / (pitch - bend)));
