@@ -118,38 +118,53 @@ fn a_study_says_what_its_runs_say_and_runs_none_of_them_twice() {
     println!("{told}");
     let table = Columns::read(&dir.join("accuracy.csv")).unwrap();
     let labels = table.texts("point");
-    let expected =
-        ["default", "one quantum less", "one quantum more", "reference", "beams × 0.6", "beams × 2", "loading × 0.5"];
+    let expected = [
+        "default",
+        "one quantum less",
+        "one quantum more",
+        "two beams less",
+        "one beam less",
+        "one beam more",
+        "two beams more",
+        "reference",
+        "beams × 0.6",
+        "beams × 2",
+        "loading × 0.5",
+    ];
     assert_eq!(labels, expected);
+    let row = |label: &str| labels.iter().position(|l| *l == label).unwrap();
+    let impossible = row("beams × 0.6");
     assert!(labels.iter().all(|label| told.contains(label)), "{told}");
     let times = table.numbers("time_over_default");
-    assert_eq!(table.texts("ended")[4], "impossible", "19 beams do not go around a lap");
+    assert_eq!(table.texts("ended")[impossible], "impossible", "19 beams do not go around a lap");
     assert!((times[..3].iter().sum::<f64>() - 3.0).abs() < 1e-9, "{times:?}");
     assert_eq!(times.iter().filter(|time| time.is_nan()).count(), 1, "{times:?}");
     // several times the work, whatever the machine does meanwhile
-    assert!(times[3] > 2.0, "{times:?}");
+    assert!(times[row("reference")] > 2.0, "{times:?}");
 
-    // errors are differences from the reference, and none is claimed that chance alone may make
+    // errors are differences from the reference, and none is claimed that places of nodes may make
     let json: Value = serde_json::from_slice(&fs::read(dir.join("accuracy.json")).unwrap()).unwrap();
     let of = |name: &str| Results::read(&dir.join("points").join(name)).unwrap();
-    let (reference, chance) = (of("reference"), json["by_chance"]["F_nor"].as_f64().unwrap());
-    assert!(chance > 0.0);
-    for (row, label) in labels.iter().enumerate().filter(|(row, _)| *row != 4) {
+    let by = |what: &str| json[what]["F_nor"].as_f64().unwrap();
+    let (reference, chance, places) = (of("reference"), by("by_chance"), by("by_places_of_nodes"));
+    assert!(chance > 0.0 && places > chance, "{chance} {places}");
+    for (row, label) in labels.iter().enumerate().filter(|(row, _)| *row != impossible) {
         let name = label.replace(" × ", "-").replace(' ', "-");
         let name = name.as_str();
         let found = difference(&of(name).curve(&MEASURES[0]), &reference.curve(&MEASURES[0])).unwrap().l2;
-        let (key, expected) = if found < chance { ("below", chance) } else { ("l2", found) };
+        let (key, expected) = if found < places { ("below", places) } else { ("l2", found) };
         let stated = json["points"][row]["errors"]["F_nor"][key].as_f64().unwrap();
         assert!((stated - expected).abs() <= 1e-12 * expected, "{name}: {stated} for {expected}");
         let cell = table.texts("error_f_nor")[row];
         let claimed: f64 = cell.trim_start_matches('<').parse().unwrap();
-        assert_eq!((claimed, cell.starts_with('<')), (found.max(chance), found < chance), "{name}");
+        assert_eq!((claimed, cell.starts_with('<')), (found.max(places), found < places), "{name}");
     }
 
     // the flags of a point are those that make it, from the tightened state where only the loading differs
     let flags = table.texts("flags");
-    assert_eq!(flags[5], "--set resolution.beams_per_lap=64");
-    assert!(flags[6].starts_with("--set steps.1.shear.time_s=0.000025 --from points/default/state/"), "{}", flags[6]);
+    assert_eq!(flags[row("beams × 2")], "--set resolution.beams_per_lap=64");
+    let loading = flags[row("loading × 0.5")];
+    assert!(loading.starts_with("--set steps.1.shear.time_s=0.000025 --from points/default/state/"), "{loading}");
     let hash = |dir: &Path| {
         let summary: Value = serde_json::from_slice(&fs::read(dir.join("summary.json")).unwrap()).unwrap();
         summary["state_hash"].as_str().unwrap().to_owned()

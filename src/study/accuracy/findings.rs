@@ -23,8 +23,10 @@ pub struct Row {
 /// A study, as far as it has come.
 pub struct Findings {
     pub measures: Vec<&'static Measure>,
-    /// How far two runs are apart by chance, by measure: relative L2.
+    /// How far two runs of the case are apart by chance, by measure: relative L2.
     pub chance: Vec<f64>,
+    /// How far runs on meshes of the same fineness are apart, whose nodes lie at other places: no error is known better.
+    pub places: Vec<f64>,
     pub rows: Vec<Row>,
 }
 
@@ -48,13 +50,18 @@ impl Findings {
             measures.iter().map(|m| results.map_or_else(Curve::new, |results| results.curve(m))).collect()
         };
         let (reference, itself) = (curves(of(Role::Reference)), curves(default));
-        let alike = rows.iter().filter(|row| row.is_alike());
-        let alike: Vec<Vec<Curve>> = alike.filter_map(|row| row.results.as_ref()).map(|r| curves(Some(r))).collect();
-        let scatter = |k: usize| {
-            let alike: Vec<&[[f64; 2]]> = alike.iter().map(|curves| curves[k].as_slice()).collect();
-            smoothed(&alike).map_or(f64::NAN, |means| by_chance(spread(&means), means.len()))
+        let scatter = |belongs: &dyn Fn(Role) -> bool| -> Vec<f64> {
+            let runs = rows.iter().filter(|row| belongs(row.point.role)).filter_map(|row| row.results.as_ref());
+            let runs: Vec<Vec<Curve>> = runs.map(|results| curves(Some(results))).collect();
+            let apart = |k: usize| {
+                let curves: Vec<&[[f64; 2]]> = runs.iter().map(|curves| curves[k].as_slice()).collect();
+                smoothed(&curves).map_or(f64::NAN, |means| by_chance(spread(&means), means.len()))
+            };
+            (0..measures.len()).map(apart).collect()
         };
-        let chance = (0..measures.len()).map(scatter).collect();
+        let chance = scatter(&|role| matches!(role, Role::Default | Role::Chance));
+        let places = scatter(&|role| matches!(role, Role::Default | Role::Places));
+        let places = places.into_iter().zip(&chance).map(|(places, chance)| places.max(*chance)).collect();
         let from = |own: &[Curve], other: &[Curve]| own.iter().zip(other).map(|(a, b)| difference(a, b)).collect();
         let compared: Vec<[Vec<Option<Difference>>; 2]> = rows
             .iter()
@@ -69,20 +76,20 @@ impl Findings {
             (row.errors, row.changes) = (errors, changes);
             row.time = unit.as_ref().map_or(f64::NAN, |unit| row.ran.over(unit));
         }
-        let mut findings = Self { measures, chance, rows };
+        let mut findings = Self { measures, chance, places, rows };
         for row in findings.front() {
             findings.rows[row].front = true;
         }
         Ok(findings)
     }
 
-    /// Error of a row in a measure, and whether it is above chance: one below is only known to be no larger.
+    /// Error of a row in a measure, and whether it is above what places of nodes make: one below is only known to be no larger.
     pub fn claim(&self, row: &Row, measure: usize) -> Option<(f64, bool)> {
         let error = row.errors.get(measure).copied().flatten()?.l2;
-        Some(bounded(error, self.chance[measure]))
+        Some(bounded(error, self.places[measure]))
     }
 
-    /// As [`claim`](Self::claim), for the difference from the case itself.
+    /// Difference of a row from the case itself, and whether it is above chance.
     pub fn effect(&self, row: &Row, measure: usize) -> Option<(f64, bool)> {
         let change = row.changes.get(measure).copied().flatten()?.l2;
         Some(bounded(change, self.chance[measure]))

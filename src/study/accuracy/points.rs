@@ -2,7 +2,7 @@
 
 use super::Options;
 use super::stopwatch::{Clocks, Stopwatch};
-use super::turns::{CHANCE, Flags, REFERENCE, Turn, chosen};
+use super::turns::{CHANCE, Flags, PLACES, REFERENCE, Turn, chosen};
 use crate::backend::gpu;
 use crate::case::differences::differences;
 use crate::case::parse;
@@ -31,6 +31,8 @@ pub enum Role {
     Default,
     /// The case again, with a chance of its own.
     Chance,
+    /// The case with nodes at other places.
+    Places,
     Reference,
     /// Shows that the reference has converged.
     Check,
@@ -138,6 +140,7 @@ impl<'a> Runner<'a> {
         };
         let mut points = vec![own];
         points.extend(CHANCE.iter().filter_map(|turn| point(Role::Chance, turn)));
+        points.extend(PLACES.iter().filter_map(|turn| point(Role::Places, turn)));
         points.extend(point(Role::Reference, &REFERENCE));
         points.extend(turned.filter(differs));
         Ok(points)

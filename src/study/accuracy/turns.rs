@@ -10,6 +10,8 @@ pub enum Change {
     To(&'static str),
     /// A multiple of what it is; whole numbers stay whole.
     Times(f64),
+    /// A whole number more than it is.
+    Plus(i64),
 }
 
 /// A point of the study: what is changed of the case.
@@ -24,7 +26,7 @@ pub struct Turn {
     pub changes: &'static [(&'static str, Change)],
 }
 
-use Change::{Times, To};
+use Change::{Plus, Times, To};
 
 const fn turn(knob: &'static str, label: &'static str, changes: &'static [(&'static str, Change)]) -> Turn {
     Turn { knob, label, changes }
@@ -79,6 +81,14 @@ pub const CHECK: Turn = turn(
 pub const CHANCE: [Turn; 2] = [
     turn("chance", "one quantum less", &[(QUANTA, To("-1"))]),
     turn("chance", "one quantum more", &[(QUANTA, To("1"))]),
+];
+
+/// Runs whose nodes of threads lie elsewhere, on a mesh as fine as that of the case: loops slip a little earlier or later in each.
+pub const PLACES: [Turn; 4] = [
+    turn("places of nodes", "two beams less", &[(BEAMS, Plus(-2))]),
+    turn("places of nodes", "one beam less", &[(BEAMS, Plus(-1))]),
+    turn("places of nodes", "one beam more", &[(BEAMS, Plus(1))]),
+    turn("places of nodes", "two beams more", &[(BEAMS, Plus(2))]),
 ];
 
 /// All points, the long ones last.
@@ -172,6 +182,7 @@ impl Change {
         let new = match self {
             To(text) => serde_json::from_str(text).unwrap_or_else(|_| json!(text)),
             Times(factor) if old.is_u64() => json!((old.as_f64()? * factor).round().max(1.0) as u64),
+            Plus(more) => json!(old.as_u64()?.checked_add_signed(*more)?),
             // digits beyond the sixth would only be noise of the multiplication
             Times(factor) => json!(format!("{:.5e}", old.as_f64()? * factor).parse::<f64>().ok()?),
         };
@@ -234,6 +245,8 @@ mod tests {
     #[test]
     fn turns_become_overrides() {
         assert_eq!(sets(&[(BEAMS, Times(1.35))]).unwrap(), ["resolution.beams_per_lap=81"]);
+        assert_eq!(sets(&[(BEAMS, Plus(-2))]).unwrap(), ["resolution.beams_per_lap=58"]);
+        assert_eq!(sets(&[(BEAMS, Plus(-61))]), None, "less than none");
         assert_eq!(sets(&[("loading", Times(2.0))]).unwrap(), ["steps.1.shear.time_s=0.02"]);
         assert_eq!(sets(&[("tightening", Times(0.5))]).unwrap(), ["steps.0.pretension.time_s=0.0015"]);
         assert_eq!(sets(&[("accuracy", To("preview"))]).unwrap(), ["accuracy=preview"]);

@@ -37,7 +37,7 @@ impl Report<'_> {
         file::replace(&folder.join("accuracy.html"), |w| w.write_all(page.as_bytes()))
     }
 
-    /// One row a point; relative L2 differences, `<` before those that chance alone may make.
+    /// One row a point; relative L2 differences, `<` before those that chance, or where nodes lie, may make.
     fn table(&self, path: &Path) -> Result<()> {
         let f = self.findings;
         let names: Vec<String> = f.measures.iter().map(|m| m.name.to_lowercase().replace(' ', "_")).collect();
@@ -91,10 +91,10 @@ impl Report<'_> {
 
     fn json(&self) -> Value {
         let f = self.findings;
-        // a difference that chance alone may make is only known to be below that
+        // a difference that chance or places of nodes may make is only known to be below that
         let differences = |list: &[Option<Difference>], claim: &dyn Fn(usize) -> Option<(f64, bool)>| {
             let value = |(k, d): (usize, &Option<Difference>)| match (d, claim(k)) {
-                (Some(_), Some((chance, false))) => json!({ "below": chance }),
+                (Some(_), Some((bound, false))) => json!({ "below": bound }),
                 (Some(d), _) => json!({ "l2": d.l2, "rms": d.rms }),
                 (None, _) => Value::Null,
             };
@@ -114,11 +114,15 @@ impl Report<'_> {
             value["front"] = json!(row.front);
             value
         };
-        let chance = f.measures.iter().zip(&f.chance).map(|(m, c)| (m.name.to_owned(), json!(c)));
+        let named = |values: &[f64]| {
+            let values = f.measures.iter().zip(values).map(|(m, value)| (m.name.to_owned(), json!(value)));
+            values.collect::<serde_json::Map<_, _>>()
+        };
         json!({
             "title": self.title,
             "command": self.command,
-            "by_chance": chance.collect::<serde_json::Map<_, _>>(),
+            "by_chance": named(&f.chance),
+            "by_places_of_nodes": named(&f.places),
             "repeated_time_over_default": f.repeated(),
             "points": f.rows.iter().enumerate().map(row).collect::<Vec<_>>(),
         })
@@ -141,7 +145,8 @@ impl Report<'_> {
         let front = f.rows.iter().filter(|row| measure == 0 && row.front);
         let mut front: Vec<[f64; 2]> = front.filter_map(|row| Some([row.time, 100.0 * f.claim(row, 0)?.0])).collect();
         front.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let mut lines = vec![(100.0 * f.chance[measure], format!("by chance: {:.3} %", 100.0 * f.chance[measure]))];
+        let places = 100.0 * f.places[measure];
+        let mut lines = vec![(places, format!("by places of nodes: {places:.3} %"))];
         if let Some((error, _)) = f.row(Role::Check).and_then(|row| f.claim(row, measure)) {
             lines.push((100.0 * error, format!("finer reference: {:.3} %", 100.0 * error)));
         }
@@ -158,6 +163,7 @@ impl Report<'_> {
             ("default", wall(Role::Default)),
             ("reference", wall(Role::Reference)),
             ("finer reference differs by", check.map_or("not run".into(), |claim| format!("{} %", percent(claim)))),
+            ("places of nodes make", f.places.first().map_or("–".into(), |places| format!("{:.3} %", 100.0 * places))),
             ("repeated runs take", format!("{low:.3} to {high:.3} of their mean")),
         ]);
         page.heading("Time against error");
@@ -240,14 +246,14 @@ impl Report<'_> {
             let _ = writeln!(t, "{label:<22} {steps:>8} {wall:>8.1} {time:>8}{errors}{front}");
         }
         let [low, high] = f.repeated();
-        t += "errors in %: relative L2 difference from the reference, < where chance alone may make it; ◂ on the front\n";
+        t += "errors in %: relative L2 difference from the reference, < where places of nodes may make it; ◂ on the front\n";
         let _ = write!(t, "time over the mean of runs that only differ by chance, which take {low:.3} to {high:.3}");
         t
     }
 }
 
 const CAPTION: &str = "Relative L2 difference of the force curve from that of the reference. Open marks lie below what runs differ by \
-                       chance, and are drawn there. The line joins the points that no other one beats.";
+                       whose nodes lie at other places, and are drawn there. The line joins the points that no other one beats.";
 
 /// A claim as a share, with all digits.
 fn exact((error, sure): (f64, bool)) -> String {
