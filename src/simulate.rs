@@ -22,13 +22,15 @@ use crate::backend::gpu::{Device, Gpu};
 use crate::case::Case;
 use crate::case::domain::{Clamps, Domain};
 use crate::case::steps::Precision;
+use crate::contact::found;
 use crate::contact::status;
 use crate::contact::threads::MOST_PAIRS;
-use crate::contact::travel::{SKIN_MOVED, SKIN_USED};
+use crate::contact::travel::{SKIN_APART, SKIN_USED};
 use crate::dynamics::time_step;
 use crate::error::{Error, Result};
 use crate::kernel::buffer::{Buffer, Initial};
 use crate::kernel::lane::Isa;
+use crate::kernel::position::QUANTUM;
 use crate::kernel::row::Row;
 use crate::mesh::Mesh;
 use crate::plan::{self, Capacity, Model};
@@ -95,6 +97,8 @@ pub struct Simulation {
     /// Factor on the time step: below one in a run that has gone back.
     share: f64,
     searches: u64,
+    /// Slaves and beams that were searched since the last search of everything.
+    searched: u64,
     /// Seconds in stages of backends that larger tables have replaced.
     spent_before: Vec<(&'static str, f64)>,
     /// Largest speed of a node after the last burst, mm/s.
@@ -208,6 +212,7 @@ impl Simulation {
             dt_before: 0.0,
             share: 1.0,
             searches: 0,
+            searched: 0,
             spent_before: Vec::new(),
             speed: 1e9,
             burst: BURST,
@@ -369,12 +374,15 @@ impl Simulation {
         let contact = self.case.effects.contact.as_ref().filter(|_| self.model.active.searches());
         let skin = contact.map_or(f64::INFINITY, |c| c.skin_mm);
         let mut left = SKIN_USED * skin - travel - affine;
-        if affine > SKIN_MOVED * skin || load.radius > self.gradient_at_search.radius {
+        let found = self.model.buffers.found.into_iter().flatten();
+        let all: usize = found.map(|found| self.model.plan.buffers[found.0].len).sum();
+        let pays = self.searched >= all as u64;
+        if affine > SKIN_APART * skin || load.radius > self.gradient_at_search.radius || left < 0.0 && pays {
             self.search_all()?;
             left = SKIN_USED * skin;
         } else if left < 0.0 {
             self.search()?;
-            left = (SKIN_USED - SKIN_MOVED) * skin - affine;
+            left = SKIN_USED * skin - affine;
         }
         // a float that is too large for an integer becomes the largest one
         let sure = (left.min(FARTHEST) / (SPEED_MARGIN * self.speed * self.dt)) as u64;
@@ -413,15 +421,24 @@ impl Simulation {
 
     /// Searches contact everywhere.
     fn search_all(&mut self) -> Result<()> {
-        if let Some(moved) = self.model.buffers.moved {
-            self.backend.set_bytes(moved, bytemuck::cast_slice(&vec![1u32; self.mesh.nodes.len()]));
+        let b = &self.model.buffers;
+        if let Some(before) = b.before {
+            let now = self.backend.ints(b.quanta).into_iter().zip(self.backend.scalars(b.remainder));
+            let now: Vec<i32> =
+                now.map(|(quanta, rest)| quanta.wrapping_add((rest / QUANTUM).round() as i32)).collect();
+            self.backend.set_bytes(before, bytemuck::cast_slice(&now));
+        }
+        for found in b.found.into_iter().flatten() {
+            let count = self.model.plan.buffers[found.0].len;
+            self.backend.set_bytes(found, bytemuck::cast_slice(&vec![found::NEVER; count]));
         }
         self.search()?;
+        self.searched = 0;
         self.gradient_at_search = self.load();
         Ok(())
     }
 
-    /// Runs the contact search around nodes that have moved, with larger tables if they overflow: what does not fit is left as it
+    /// Runs the contact search where bodies have moved relative to each other, with larger tables if they overflow: what does not fit is left as it
     /// was, so that a search that overflows leaves nothing that the next one does not find again.
     fn search(&mut self) -> Result<()> {
         if self.model.plan.search.is_empty() {
@@ -438,6 +455,7 @@ impl Simulation {
             if full == 0 {
                 self.check_flags(&status)?;
                 self.searches += 1;
+                self.searched += u64::from(status[status::SEARCHED]);
                 return Ok(());
             }
             crowded = self.most_crowded();
@@ -489,7 +507,7 @@ impl Simulation {
 
     fn clear_travel(&mut self, status: &[u32]) {
         let mut bytes = bytemuck::cast_slice::<u32, u8>(status).to_vec();
-        for place in [status::FLAGS, status::TRAVEL, status::SPEED] {
+        for place in [status::FLAGS, status::TRAVEL, status::SPEED, status::SEARCHED] {
             bytes[4 * place..][..4].fill(0);
         }
         // flags that stop the run stay

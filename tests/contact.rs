@@ -9,8 +9,7 @@ use common::{
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use tricot::case::steps::Precision::{self, F32, F64};
-use tricot::contact::{EMPTY, face, grid};
-use tricot::kernel::buffer::Buffer;
+use tricot::contact::{EMPTY, face, found};
 use tricot::mesh::Mesh;
 use tricot::mesh::surface::Surface;
 use tricot::simulate::Simulation;
@@ -492,14 +491,21 @@ fn moved_apart(displacements: [[f64; 3]; 3], high: f64, precision: Precision) ->
 }
 
 #[test]
-fn contact_is_searched_again_only_around_what_has_moved() {
-    // cells that hold something, and those near what had moved at the last search
-    let cells = |simulation: &Simulation| {
-        let buffers = &simulation.model.plan.buffers;
-        let counts = buffers.iter().position(|buffer| buffer.name == "items of cells").unwrap();
-        let counts = simulation.backend().uints(Buffer(counts));
-        let count = |holds: fn(&u32) -> bool| counts.iter().filter(|count| holds(count)).count();
-        (count(|count| *count > 0), count(|count| count & grid::MOVED_HERE != 0))
+fn contact_is_searched_again_only_where_bodies_move_relative_to_each_other() {
+    // whether nodes of the first and of the second thread were searched again since the last search of everything
+    let again = |simulation: &Simulation| {
+        let when = simulation.backend().uints(simulation.model.buffers.found[0].unwrap());
+        assert!(when.len() == 4 && when.iter().all(|when| *when != found::NEVER));
+        [&when[..2], &when[2..]].map(|thread| thread.contains(&found::SINCE))
+    };
+    let ever_again = |simulation: &mut Simulation| {
+        let [mut first, mut second] = again(simulation);
+        for part in 1..=100 {
+            advance(simulation, 1e-5 * f64::from(part));
+            let [now_first, now_second] = again(simulation);
+            (first, second) = (first || now_first, second || now_second);
+        }
+        [first, second]
     };
     let force = |simulation: &Simulation| {
         let first = simulation.mesh.first_thread_node();
@@ -509,13 +515,14 @@ fn contact_is_searched_again_only_around_what_has_moved() {
         // the second thread slides over the slab, the first one lies on it
         let mut simulation = moved_apart([[0.0; 3], [0.0; 3], [2.0, 0.0, 0.0]], 0.15, precision);
         advance(&mut simulation, 1e-6);
-        let (held, everywhere) = cells(&simulation);
-        assert_eq!(held, everywhere, "the first search is one of everything");
+        assert_eq!(again(&simulation), [false; 2], "the first search is one of everything");
         let before = force(&simulation);
-        advance(&mut simulation, 1e-3);
-        let (held, moved) = cells(&simulation);
-        println!("{precision:?}: {} searches, the last one in {moved} of {held} cells", simulation.searches());
-        assert!(simulation.searches() > 50 && moved > 0 && 4 * moved < held);
+        assert_eq!(ever_again(&mut simulation), [false, true], "{precision:?}, {} looks", simulation.searches());
+        // carried along together, neither is
+        let mut carried = moved_apart([[2.0, 0.0, 0.0]; 3], 0.15, precision);
+        advance(&mut carried, 1e-6);
+        assert_eq!(ever_again(&mut carried), [false; 2], "{precision:?}");
+        assert!(simulation.searches() > 50 && carried.searches() > 50);
         let after = force(&simulation);
         assert_eq!(before[..2], after[..2], "the thread that lies still");
         let expected = 50.0 * 0.25 * 0.05;

@@ -101,10 +101,9 @@ fn parameters(file: &str) -> Vec<Field<&'static str>> {
         "elements/hex8" | "elements/hex8_reduced" => fields!(elements::block::Params: nodes, left),
         "contact/grid" | "contact/candidates" | "contact/penalty" | "contact/threads" | "contact/tie" => fields!(
             contact::Params: period, cells, capacity, slots, beam_slots, slabs, origin, cell, skin, friction, tangential, damping,
-            force_quantum, stiffness_quantum, thread_radius, thread_thread, self_arc, depth, state
+            force_quantum, stiffness_quantum, thread_radius, thread_thread, self_arc, depth, state, apart
         ),
         "conditions/prescribed" => fields!(conditions::prescribed::Params: first_thread, gravity),
-        "contact/travel" => fields!(contact::travel::Params: moved),
         "dynamics/assemble" => fields!(
             dynamics::assemble::Params: first_thread, force_quantum, stiffness_quantum, mass_factor, mass_memory,
             mass_per_stiffness

@@ -2,6 +2,8 @@
 
 #define STATUS
 #define BODIES
+#define BEFORE
+#define BOXES
 #include "contact/grid"
 #include "contact/penalty"
 
@@ -17,10 +19,11 @@
 @group(1) @binding(8) var<storage, read> counts: array<u32>;
 @group(1) @binding(9) var<storage, read> lists: array<u32>;
 @group(1) @binding(10) var<storage, read> boxes: array<f32>;
-@group(1) @binding(11) var<storage, read> moved: array<u32>;
+@group(1) @binding(11) var<storage, read> before: array<i32>;
 @group(1) @binding(12) var<storage, read_write> keys: array<u32>;
 @group(1) @binding(13) var<storage, read_write> states: array<f32>;
-@group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
+@group(1) @binding(14) var<storage, read_write> found_when: array<u32>;
+@group(1) @binding(15) var<storage, read_write> status: array<atomic<u32>>;
 
 // Bodies that one slave can be near to before the search gives up.
 const MOST: u32 = 16u;
@@ -107,6 +110,34 @@ fn best_of(slave: u32, body: u32, image: vec2<i32>, slice: i32, first: i32, reac
     return best;
 }
 
+// An image of a slab within reach of a slave.
+struct Within {
+    yes: bool,
+    image: vec2<i32>,
+}
+
+fn within(near: u32, position: vec3<f32>, reach: f32, stretched: vec2<f32>) -> Within {
+    if position.z < boxes[BOX * near + 2u] - reach || position.z > boxes[BOX * near + 3u] + reach {
+        return Within(false, vec2<i32>(0));
+    }
+    let middle = vec2<f32>(boxes[BOX * near], boxes[BOX * near + 1u]);
+    var image = vec2<i32>(0);
+#if PERIODIC
+    let period = vec2<f32>(params.period) * QUANTUM;
+    if params.period.x != 0 {
+        image.x = to_i32((position.x - middle.x) / period.x);
+    }
+    if params.period.y != 0 {
+        image.y = to_i32((position.y - middle.y) / period.y);
+    }
+    let from_middle = abs(position.xy - middle - vec2<f32>(image) * period);
+#else
+    let from_middle = abs(position.xy - middle);
+#endif
+    let room = vec2<f32>(boxes[BOX * near + 4u], boxes[BOX * near + 5u]) + reach * stretched;
+    return Within(!any(from_middle > room), image);
+}
+
 fn candidates(item: u32) {
     let back = inverse();
     let stretched = stretch(back);
@@ -117,21 +148,28 @@ fn candidates(item: u32) {
 #endif
     let reach = values[SLAVE_VALUES * item + 1u] + params.skin;
     let position = absolute(back, slave);
-#if PERIODIC
-    let period = vec2<f32>(params.period) * QUANTUM;
-#endif
     if !(is_finite(position.x) && is_finite(position.y) && is_finite(position.z)) {
         atomicOr(&status[FLAGS], NOT_FINITE);
         return;
     }
     let cell = cell_index(cells(0u, position.x, position.x).x, cells(1u, position.y, position.y).x);
-    if (counts[cell] & MOVED_HERE) == 0u && moved[slave] == 0u {
-        return;
-    }
-    let listed = counts[cell] & ~MOVED_HERE;
+    let listed = counts[cell];
     // overflow keeps what was known, and is searched again with larger tables
     if listed > params.capacity {
         return;
+    }
+    let found_at = found_when[item];
+    if found_at == WITH_ALL {
+        let own_motion = vec3<f32>(motion(slave));
+        var searches = false;
+        for (var i = 0u; i < listed && !searches; i++) {
+            let near = lists[cell * params.capacity + i];
+            searches = near < params.slabs && has_moved(near, Motion(own_motion, own_motion), f32(params.apart))
+                && within(near, position, reach, stretched).yes;
+        }
+        if !searches {
+            return;
+        }
     }
     var found: array<Best, MOST>;
     var count = 0u;
@@ -142,34 +180,17 @@ fn candidates(item: u32) {
             continue;
         }
         let body = slabs[SLAB * near];
-        let middle = vec2<f32>(boxes[BOX * near], boxes[BOX * near + 1u]);
-        let low = boxes[BOX * near + 2u];
-        let high = boxes[BOX * near + 3u];
 #if THREAD
 #else
         if body == own {
             continue;
         }
 #endif
-        if position.z < low - reach || position.z > high + reach {
+        let seen = within(near, position, reach, stretched);
+        if !seen.yes {
             continue;
         }
-        var image = vec2<i32>(0);
-#if PERIODIC
-        if params.period.x != 0 {
-            image.x = to_i32((position.x - middle.x) / period.x);
-        }
-        if params.period.y != 0 {
-            image.y = to_i32((position.y - middle.y) / period.y);
-        }
-        let from_middle = abs(position.xy - middle - vec2<f32>(image) * period);
-#else
-        let from_middle = abs(position.xy - middle);
-#endif
-        let room = vec2<f32>(boxes[BOX * near + 4u], boxes[BOX * near + 5u]) + reach * stretched;
-        if any(from_middle > room) {
-            continue;
-        }
+        var image = seen.image;
         var slice = i32(slabs[SLAB * near + 1u]);
 #if PERIODIC
         // a closed yarn goes on through its own images: count its slices on instead
@@ -251,5 +272,7 @@ fn candidates(item: u32) {
             states[size * (first_slot + slot) + i] = now.state[i];
         }
     }
+    found_when[item] = select(SINCE, WITH_ALL, found_at == NEVER);
+    atomicAdd(&status[SEARCHED], 1u);
 }
 #endif

@@ -12,21 +12,26 @@ fn clear(cell: u32) {
 #if fill_slabs
 #define STATUS
 #define BODIES
+#define BEFORE
 #endif
 #if fill_beams
 #define STATUS
+#define BEFORE
 #endif
 #include "contact/face"
 #if fill_beams
 #include "contact/bow"
 #endif
 
-// Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm, half sizes in the plane, mm (2).
-const BOX: u32 = 6u;
+// Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm, half sizes in the plane, mm (2); then
+// least (3) and greatest motion (3) of its nodes since everything was searched, quanta.
+const BOX: u32 = 12u;
+// Where motion starts in a box.
+const MOTION: u32 = 6u;
+// Largest motion that a box tells of, quanta.
+const MOST_MOTION: i32 = 16777216;
 // Integers of a slab: body, slice, first face around the ring.
 const SLAB: u32 = 3u;
-// Bit of a cell's count: something near has moved, and candidates are searched there again.
-const MOVED_HERE: u32 = 0x80000000u;
 // Faces of a slab at most.
 const SLAB_FACES: i32 = 8;
 // More than rounding moves a place in the plane, mm: an item must not be in too few cells.
@@ -90,6 +95,41 @@ fn cell_index(x: i32, y: i32) -> u32 {
     return u32(rem_euclid(y, n.y) * n.x + rem_euclid(x, n.x));
 }
 
+#if BEFORE
+// Displacement of a node since everything was searched, quanta; what includes this binds `before`, that of then.
+fn motion(node: u32) -> vec3<i32> {
+    let plane = arrayLength(&remainder) / 3u;
+    let y = node + plane;
+    let z = y + plane;
+    let rest = vec3<f32>(remainder[node], remainder[y], remainder[z]) * (1.0 / QUANTUM);
+    let now = vec3<i32>(quanta[node], quanta[y], quanta[z]) + vec3<i32>(to_i32(rest.x), to_i32(rest.y), to_i32(rest.z));
+    return clamp(now - vec3<i32>(before[node], before[y], before[z]), vec3<i32>(-MOST_MOTION), vec3<i32>(MOST_MOTION));
+}
+#endif
+
+#if BOXES
+// Motion of an item.
+struct Motion {
+    least: vec3<f32>,
+    greatest: vec3<f32>,
+}
+
+// That of a box; what includes this binds `boxes`.
+fn motion_of(item: u32) -> Motion {
+    let at = BOX * item + MOTION;
+    return Motion(
+        vec3<f32>(boxes[at], boxes[at + 1u], boxes[at + 2u]),
+        vec3<f32>(boxes[at + 3u], boxes[at + 4u], boxes[at + 5u]),
+    );
+}
+
+// Whether an item, by its box, has moved by more than `apart` relative to something else.
+fn has_moved(item: u32, other: Motion, apart: f32) -> bool {
+    let own = motion_of(item);
+    return any(max(own.greatest - other.least, other.greatest - own.least) > vec3<f32>(apart));
+}
+#endif
+
 #if ROOT
 @group(1) @binding(0) var<storage, read> reference: array<i32>;
 @group(1) @binding(1) var<storage, read> quanta: array<i32>;
@@ -98,14 +138,14 @@ fn cell_index(x: i32, y: i32) -> u32 {
 @group(1) @binding(3) var<storage, read> slabs: array<u32>;
 @group(1) @binding(4) var<storage, read> bodies: array<u32>;
 @group(1) @binding(5) var<storage, read> ring_lines: array<u32>;
-@group(1) @binding(6) var<storage, read> moved: array<u32>;
+@group(1) @binding(6) var<storage, read> before: array<i32>;
 const WRITES: u32 = 7u;
 #else
 @group(1) @binding(3) var<storage, read> ends: array<u32>;
 @group(1) @binding(4) var<storage, read> beams: array<f32>;
 @group(1) @binding(5) var<storage, read> neighbours: array<u32>;
 @group(1) @binding(6) var<storage, read> shares: array<f32>;
-@group(1) @binding(7) var<storage, read> moved: array<u32>;
+@group(1) @binding(7) var<storage, read> before: array<i32>;
 const WRITES: u32 = 8u;
 #endif
 @group(1) @binding(WRITES) var<storage, read_write> counts: array<atomic<u32>>;
@@ -113,19 +153,29 @@ const WRITES: u32 = 8u;
 @group(1) @binding(WRITES + 2u) var<storage, read_write> boxes: array<f32>;
 @group(1) @binding(WRITES + 3u) var<storage, read_write> status: array<atomic<u32>>;
 
-// The box of an item, from its first node.
+// The box of an item, from its first node, and the motion of its nodes.
 struct Bounds {
     low: vec3<f32>,
     high: vec3<f32>,
+    least: vec3<i32>,
+    greatest: vec3<i32>,
+}
+
+fn no_bounds() -> Bounds {
+    return Bounds(vec3<f32>(0.0), vec3<f32>(0.0), vec3<i32>(MOST_MOTION), vec3<i32>(-MOST_MOTION));
 }
 
 fn grow(bounds: Bounds, back: Inverse, v: vec3<f32>) -> Bounds {
     let x = vec3<f32>(pull_back(back, v), v.z);
-    return Bounds(min(bounds.low, x), max(bounds.high, x));
+    return Bounds(min(bounds.low, x), max(bounds.high, x), bounds.least, bounds.greatest);
 }
 
-// Puts an item into every cell that its box touches, `reach` around, and says there whether it has moved.
-fn put(item: u32, origin: u32, back: Inverse, bounds: Bounds, reach: f32, has_moved: bool) {
+fn moves(bounds: Bounds, motion: vec3<i32>) -> Bounds {
+    return Bounds(bounds.low, bounds.high, min(bounds.least, motion), max(bounds.greatest, motion));
+}
+
+// Puts an item into every cell that its box touches, `reach` around.
+fn put(item: u32, origin: u32, back: Inverse, bounds: Bounds, reach: f32) {
     let base = absolute(back, origin);
     let low = bounds.low;
     let high = bounds.high;
@@ -135,16 +185,17 @@ fn put(item: u32, origin: u32, back: Inverse, bounds: Bounds, reach: f32, has_mo
     boxes[BOX * item + 3u] = base.z + high.z;
     boxes[BOX * item + 4u] = 0.5 * (high.x - low.x);
     boxes[BOX * item + 5u] = 0.5 * (high.y - low.y);
+    for (var k = 0u; k < 3u; k++) {
+        boxes[BOX * item + MOTION + k] = f32(bounds.least[k]);
+        boxes[BOX * item + MOTION + 3u + k] = f32(bounds.greatest[k]);
+    }
     let room = reach * stretch(back) + ROUNDING;
     let xs = cells(0u, base.x + low.x - room.x, base.x + high.x + room.x);
     let ys = cells(1u, base.y + low.y - room.y, base.y + high.y + room.y);
     for (var y = ys.x; y <= ys.y; y++) {
         for (var x = xs.x; x <= xs.y; x++) {
             let cell = cell_index(x, y);
-            let place = atomicAdd(&counts[cell], 1u) & ~MOVED_HERE;
-            if has_moved {
-                atomicOr(&counts[cell], MOVED_HERE);
-            }
+            let place = atomicAdd(&counts[cell], 1u);
             if place < params.capacity {
                 lists[cell * params.capacity + place] = item;
             } else {
@@ -157,21 +208,20 @@ fn put(item: u32, origin: u32, back: Inverse, bounds: Bounds, reach: f32, has_mo
 #if fill_slabs
 fn fill_slabs(item: u32) {
     let back = inverse();
-    var bounds = Bounds(vec3<f32>(0.0), vec3<f32>(0.0));
+    var bounds = no_bounds();
     let body = slabs[SLAB * item];
     let slice = i32(slabs[SLAB * item + 1u]);
     let first = i32(slabs[SLAB * item + 2u]);
     let origin = node(body, vec2<i32>(0), Place(first, slice)).node;
     let last = min(first + SLAB_FACES, ring_of(body));
-    var has_moved = false;
     for (var ring = first; ring <= last; ring++) {
         for (var end = slice; end <= slice + 1; end++) {
             let seen = node(body, vec2<i32>(0), Place(ring, end));
             bounds = grow(bounds, back, from_slave(origin, seen).current);
-            has_moved = has_moved || moved[seen.node] == 1u;
+            bounds = moves(bounds, motion(seen.node));
         }
     }
-    put(item, origin, back, bounds, params.thread_radius + params.skin, has_moved);
+    put(item, origin, back, bounds, params.thread_radius + params.skin);
 }
 #endif
 
@@ -181,11 +231,11 @@ fn fill_beams(item: u32) {
     let beam = item - params.slabs;
     let along = vector(beam);
     let aside = bow(beam).current;
-    var bounds = grow(Bounds(vec3<f32>(0.0), vec3<f32>(0.0)), back, aside);
+    var bounds = grow(no_bounds(), back, aside);
     bounds = grow(bounds, back, aside + (along.reference + along.change));
     let first = ends[2u * beam];
-    let has_moved = moved[first] == 1u || moved[ends[2u * beam + 1u]] == 1u;
-    put(item, first, back, bounds, 2.0 * params.thread_radius + params.skin, has_moved);
+    bounds = moves(moves(bounds, motion(first)), motion(ends[2u * beam + 1u]));
+    put(item, first, back, bounds, 2.0 * params.thread_radius + params.skin);
 }
 #endif
 #endif

@@ -8,6 +8,7 @@ const CONTACT_RATE: u32 = 5u;
 const TOUCHING: u32 = 6u;
 const SPEED: u32 = 9u;
 const CULPRIT: u32 = 10u;
+const SEARCHED: u32 = 11u;
 
 const CELL_FULL: u32 = 1u;
 const SLOTS_FULL: u32 = 2u;
@@ -52,9 +53,15 @@ struct Params {
     self_arc: f32,
     depth: f32,
     state: u32,
+    apart: u32,
 }
 
 @group(2) @binding(1) var<uniform> params: Params;
+
+// When candidates were found, see the twin.
+const WITH_ALL: u32 = 0u;
+const SINCE: u32 = 1u;
+const NEVER: u32 = 2u;
 
 // No candidate in a slot.
 const EMPTY: u32 = 0xffffffffu;

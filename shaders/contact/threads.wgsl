@@ -1,6 +1,9 @@
 // Contact of beams with beams: closest points of two segments, the beams' lines, penalty and friction as for faces.
 
 #define STATUS
+#if pairs
+#define BOXES
+#endif
 #if force
 #define PRESS
 #define PAIRS
@@ -69,15 +72,11 @@ fn between(a: u32, aside: Bow, b: u32, image: vec2<i32>) -> FromSlave {
 @group(1) @binding(8) var<storage, read> arcs: array<f32>;
 @group(1) @binding(9) var<storage, read> counts: array<u32>;
 @group(1) @binding(10) var<storage, read> lists: array<u32>;
-#if PERIODIC
 @group(1) @binding(11) var<storage, read> boxes: array<f32>;
-const WRITES: u32 = 12u;
-#else
-const WRITES: u32 = 11u;
-#endif
-@group(1) @binding(WRITES) var<storage, read_write> keys: array<u32>;
-@group(1) @binding(WRITES + 1u) var<storage, read_write> states: array<f32>;
-@group(1) @binding(WRITES + 2u) var<storage, read_write> status: array<atomic<u32>>;
+@group(1) @binding(12) var<storage, read_write> keys: array<u32>;
+@group(1) @binding(13) var<storage, read_write> states: array<f32>;
+@group(1) @binding(14) var<storage, read_write> found_when: array<u32>;
+@group(1) @binding(15) var<storage, read_write> status: array<atomic<u32>>;
 
 // Pairs that a beam can have.
 const MOST_PAIRS: u32 = 64u;
@@ -114,17 +113,22 @@ fn pairs(beam: u32) {
         atomicOr(&status[FLAGS], NOT_FINITE);
         return;
     }
-    var has_moved = false;
+    let found_at = found_when[beam];
+    let own_motion = motion_of(params.slabs + beam);
+    var searches = found_at != WITH_ALL;
     var full = false;
     for (var y = ys.x; y <= ys.y; y++) {
         for (var x = xs.x; x <= xs.y; x++) {
-            let listed = counts[cell_index(x, y)];
-            has_moved = has_moved || (listed & MOVED_HERE) != 0u;
-            full = full || (listed & ~MOVED_HERE) > params.capacity;
+            let cell = cell_index(x, y);
+            full = full || counts[cell] > params.capacity;
+            for (var i = 0u; i < counts[cell] && !(searches || full); i++) {
+                let near = lists[cell * params.capacity + i];
+                searches = near > params.slabs + beam && has_moved(near, own_motion, f32(params.apart));
+            }
         }
     }
     // overflow keeps what was known, and is searched again with larger tables
-    if !has_moved || full {
+    if !searches || full {
         return;
     }
     // in ascending order
@@ -133,7 +137,7 @@ fn pairs(beam: u32) {
     for (var y = ys.x; y <= ys.y; y++) {
         for (var x = xs.x; x <= xs.y; x++) {
             let cell = cell_index(x, y);
-            let listed = counts[cell] & ~MOVED_HERE;
+            let listed = counts[cell];
             for (var i = 0u; i < listed; i++) {
                 let near = lists[cell * params.capacity + i];
                 if near < params.slabs + beam + 1u {
@@ -211,6 +215,8 @@ fn pairs(beam: u32) {
             states[size * (slots * beam + slot) + i] = state[i];
         }
     }
+    found_when[beam] = select(SINCE, WITH_ALL, found_at == NEVER);
+    atomicAdd(&status[SEARCHED], 1u);
 }
 #endif
 

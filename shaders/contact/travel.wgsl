@@ -1,5 +1,5 @@
-// How fast nodes are, whether they are still numbers in range, and with CONTACT how far they have moved since candidates around them
-// were searched.
+// How fast nodes are, whether they are still numbers in range, and with CONTACT how far they have moved since there was last a look
+// around for candidates.
 
 #include "kernel/position"
 #if travel
@@ -12,14 +12,10 @@
 @group(1) @binding(1) var<storage, read> remainder: array<f32>;
 
 #if remember
-@group(1) @binding(2) var<storage, read> moved: array<u32>;
-@group(1) @binding(3) var<storage, read_write> search_quanta: array<i32>;
-@group(1) @binding(4) var<storage, read_write> search_remainder: array<f32>;
+@group(1) @binding(2) var<storage, read_write> search_quanta: array<i32>;
+@group(1) @binding(3) var<storage, read_write> search_remainder: array<f32>;
 
 fn remember(node: u32) {
-    if moved[node] == 0u {
-        return;
-    }
     let plane = arrayLength(&remainder) / 3u;
     for (var k = 0u; k < 3u; k++) {
         search_quanta[node + k * plane] = quanta[node + k * plane];
@@ -33,15 +29,7 @@ fn remember(node: u32) {
 #if CONTACT
 @group(1) @binding(3) var<storage, read> search_quanta: array<i32>;
 @group(1) @binding(4) var<storage, read> search_remainder: array<f32>;
-@group(1) @binding(5) var<storage, read_write> moved: array<u32>;
-@group(1) @binding(6) var<storage, read_write> status: array<atomic<u32>>;
-
-// Distance from which on a node has moved, mm.
-struct Params {
-    moved: f32,
-}
-
-@group(2) @binding(1) var<uniform> params: Params;
+@group(1) @binding(5) var<storage, read_write> status: array<atomic<u32>>;
 #else
 @group(1) @binding(3) var<storage, read_write> status: array<atomic<u32>>;
 #endif
@@ -70,7 +58,6 @@ fn travel(node: u32) {
     }
     let v = vec3<f32>(velocity[node], velocity[node + plane], velocity[node + 2u * plane]);
 #if CONTACT
-    moved[node] = select(0u, 1u, square > params.moved * params.moved);
     raise(TRAVEL, sqrt(square));
 #endif
     raise(SPEED, sqrt(dot(v, v)));

@@ -2,13 +2,13 @@
 //!
 //! Among the faces of a body the closest one in front of which the slave lies wins; one behind which it lies only if it is
 //! clearly closer, since at a sharp edge the slave is behind the neighbouring face without being inside the body. A
-//! candidate that was known keeps its state, and its face while it touches. Slaves near nothing that has moved keep their
-//! candidates.
+//! candidate that was known keeps its state, and its face while it touches. Slaves near nothing that has moved relative to
+//! them (see [`super::travel`]) keep their candidates.
 
 use super::face::{Place, Surface, closest};
-use super::grid::{BOX, MOVED_HERE, SLAB, SLAB_FACES, absolute, cell_index, cells, inverse};
+use super::grid::{BOX, SLAB, SLAB_FACES, absolute, cell_index, cells, has_moved, inverse, motion};
 use super::penalty::{SLAVE, SLAVE_VALUES, SLOT_KEYS};
-use super::{EMPTY, MOST_STATE, Params, key, status};
+use super::{EMPTY, MOST_STATE, Params, found, key, status};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::QUANTUM;
@@ -29,10 +29,13 @@ pub const REMAINDER: usize = 7;
 pub const COUNTS: usize = 8;
 pub const ITEMS: usize = 9;
 pub const BOXES: usize = 10;
-const MOVED: usize = 11;
+/// Displacements when everything was last searched, in quanta.
+const BEFORE: usize = 11;
 const KEYS: usize = 12;
 const STATE: usize = 13;
-const STATUS: usize = 14;
+/// See [`found`].
+const FOUND: usize = 14;
+const STATUS: usize = 15;
 
 /// Bodies that one slave can be near to before the search gives up.
 const MOST: usize = 16;
@@ -73,7 +76,8 @@ impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PER
         let stretch = [0, 1].map(|k| (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt());
         let (slaves, values, slabs) = (io.uints(SLAVES), io.scalars(VALUES), io.uints(SLABS));
         let (counts, lists, boxes) = (io.uints(COUNTS), io.uints(ITEMS), io.scalars(BOXES));
-        let moved = io.uints(MOVED);
+        let apart = L::Scalar::from_i32(params.apart as i32);
+        let mut when = io.own::<u32>(FOUND);
         let mut keys = io.own::<u32>(KEYS);
         let mut states = io.own::<L::Scalar>(STATE);
         let flags = io.atomic_uints(STATUS);
@@ -92,26 +96,16 @@ impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PER
             let (x, _) = cells::<_, PERIODIC>(&params, 0, position[0], position[0]);
             let (y, _) = cells::<_, PERIODIC>(&params, 1, position[1], position[1]);
             let cell = cell_index(&params, x, y);
-            if counts[cell] & MOVED_HERE == 0 && moved[slave] == 0 {
-                continue;
-            }
-            let listed = (counts[cell] & !MOVED_HERE) as usize;
+            let listed = counts[cell] as usize;
             // overflow keeps what was known, and is searched again with larger tables
             if listed > params.capacity as usize {
                 continue;
             }
-            let mut found = [Best { key: EMPTY, in_front: (far, nowhere), behind: (far, nowhere) }; MOST];
-            let mut count = 0;
-            let mut full = false;
-            for &near in &lists[cell * params.capacity as usize..][..listed] {
-                if near >= params.slabs {
-                    continue;
-                }
-                let slab = &slabs[SLAB * near as usize..][..SLAB];
-                let (body, slice, first) = (slab[0], slab[1] as i32, slab[2] as i32);
-                let bounds = &boxes[BOX * near as usize..][..BOX];
-                if !THREAD && body == own || height < bounds[2] - reach || height > bounds[3] + reach {
-                    continue;
+            let items = &lists[cell * params.capacity as usize..][..listed];
+            // the image of a slab that is within reach, if any
+            let image_within = |bounds: &[L::Scalar]| {
+                if height < bounds[2] - reach || height > bounds[3] + reach {
+                    return None;
                 }
                 let image_along = |k: usize| {
                     let repeats = PERIODIC && params.period[k] != 0;
@@ -122,9 +116,30 @@ impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PER
                     let from = position[k] - bounds[k] - L::Scalar::from_i32(image[k]) * period[k];
                     from.abs() > bounds[4 + k] + reach * stretch[k]
                 };
-                if beside(0) || beside(1) {
+                (!beside(0) && !beside(1)).then_some(image)
+            };
+            let when = when.at(0, item);
+            if *when == found::WITH_ALL {
+                let own_motion = motion(io, [QUANTA, REMAINDER, BEFORE], slave);
+                let own_motion = [0, 1, 2].map(|k| L::Scalar::from_i32(own_motion[k]));
+                let has_moved = items.iter().filter(|near| **near < params.slabs).any(|near| {
+                    let bounds = &boxes[BOX * *near as usize..][..BOX];
+                    has_moved(bounds, own_motion, own_motion, apart) && image_within(bounds).is_some()
+                });
+                if !has_moved {
                     continue;
                 }
+            }
+            let mut best_of = [Best { key: EMPTY, in_front: (far, nowhere), behind: (far, nowhere) }; MOST];
+            let mut count = 0;
+            let mut full = false;
+            for &near in items.iter().filter(|near| **near < params.slabs) {
+                let slab = &slabs[SLAB * near as usize..][..SLAB];
+                let (body, slice, first) = (slab[0], slab[1] as i32, slab[2] as i32);
+                if !THREAD && body == own {
+                    continue;
+                }
+                let Some(image) = image_within(&boxes[BOX * near as usize..][..BOX]) else { continue };
                 // a closed yarn goes on through its own images: count its slices on instead
                 let b = surface.bodies[body as usize];
                 let turns = if PERIODIC { image[0] * b.wrap[0] + image[1] * b.wrap[1] } else { 0 };
@@ -167,13 +182,13 @@ impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PER
                 if best.in_front.0 == far && best.behind.0 == far {
                     continue;
                 }
-                match found[..count].iter_mut().find(|f| f.key == key) {
+                match best_of[..count].iter_mut().find(|f| f.key == key) {
                     Some(known) => {
                         known.in_front = nearer(known.in_front, best.in_front);
                         known.behind = nearer(known.behind, best.behind);
                     }
                     None if count < MOST => {
-                        found[count] = best;
+                        best_of[count] = best;
                         count += 1;
                     }
                     None => full = true,
@@ -183,9 +198,11 @@ impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PER
                 flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
                 continue;
             }
-            let found = &mut found[..count];
-            found.sort_unstable_by_key(|f| f.key);
-            merge(keys.item(0, item), states.item(0, item), params.state as usize, found);
+            let best_of = &mut best_of[..count];
+            best_of.sort_unstable_by_key(|f| f.key);
+            merge(keys.item(0, item), states.item(0, item), params.state as usize, best_of);
+            *when = if *when == found::NEVER { found::WITH_ALL } else { found::SINCE };
+            flags[status::SEARCHED].fetch_add(1, Ordering::Relaxed);
         }
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! Cells are taken in the pulled-back plane F̄⁻¹x, where the periodic cell keeps its rectangle; a distance ρ in space is at
 //! most ρ |row of F̄⁻¹| along an axis there. A cell lists its items in any order: what is chosen from them does not depend on it.
-//! Cells near an item that has moved (see [`super::travel`]) say so; candidates are searched only there.
+//! Boxes tell how far their items have moved since everything was last searched (see [`super::travel`]).
 
 use super::bow::Bows;
 use super::face::{Place, Surface};
@@ -18,12 +18,15 @@ use crate::kernel::vector::add;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm, half sizes in the plane, mm (2).
-pub const BOX: usize = 6;
+/// Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm, half sizes in the plane, mm (2);
+/// then, see [`MOTION`], least (3) and greatest motion (3) of its nodes since everything was searched, quanta.
+pub const BOX: usize = 12;
+/// Where motion starts in a box.
+pub const MOTION: usize = 6;
+/// Largest motion that a box tells of, quanta: 2 mm, which are whole numbers in f32.
+const MOST_MOTION: i32 = 1 << 24;
 /// Integers of a slab: body, slice, first face around the ring.
 pub const SLAB: usize = 3;
-/// Bit of a cell's count: something near has moved, and candidates are searched there again.
-pub const MOVED_HERE: u32 = 1 << 31;
 /// Faces of a slab at most.
 pub const SLAB_FACES: usize = 8;
 /// More than rounding moves a place in the plane, mm: an item must not be in too few cells.
@@ -36,15 +39,15 @@ pub const REMAINDER: usize = 2;
 pub const SLABS: usize = 3;
 pub const BODIES: usize = 4;
 pub const RING_LINES: usize = 5;
-/// 1 for nodes that have moved since candidates around them were searched.
-const SLAB_MOVED: usize = 6;
+/// Displacements when everything was last searched, in quanta.
+const SLAB_BEFORE: usize = 6;
 /// Of beams, where those of slabs are.
 pub const ENDS: usize = 3;
 pub const BEAMS: usize = 4;
 /// See [`super::bow`].
 pub const NEIGHBOURS: usize = 5;
 pub const SHARES: usize = 6;
-const BEAM_MOVED: usize = 7;
+const BEAM_BEFORE: usize = 7;
 
 /// Empties the cells.
 pub struct Clear;
@@ -120,17 +123,50 @@ pub fn cell_index(params: &Params, x: i32, y: i32) -> usize {
     (y.rem_euclid(ny) * nx + x.rem_euclid(nx)) as usize
 }
 
-/// The box of an item in the pulled-back plane and in height, from its first node, mm.
+/// Displacement of a node since everything was searched, quanta. Bindings are quanta, remainder, and the displacement of then.
+#[inline(always)]
+pub fn motion<R: Real>(io: &Io<R>, bindings: [usize; 3], node: usize) -> [i32; 3] {
+    let [quanta, remainder, before] = bindings;
+    let (quanta, remainder, before) = (io.ints(quanta), io.scalars(remainder), io.ints(before));
+    let plane = before.len() / 3;
+    let along = |k: usize| {
+        let i = node + k * plane;
+        let now = quanta[i].wrapping_add((remainder[i] * R::from_f64(1.0 / QUANTUM)).to_i32());
+        now.wrapping_sub(before[i]).clamp(-MOST_MOTION, MOST_MOTION)
+    };
+    [along(0), along(1), along(2)]
+}
+
+/// Whether an item, by its box, has moved by more than `apart` relative to something that has moved between `low` and `high`.
+#[inline(always)]
+pub fn has_moved<R: Real>(bounds: &[R], low: [R; 3], high: [R; 3], apart: R) -> bool {
+    let beyond = |k: usize| (bounds[MOTION + 3 + k] - low[k]).max(high[k] - bounds[MOTION + k]) > apart;
+    beyond(0) || beyond(1) || beyond(2)
+}
+
+/// The box of an item in the pulled-back plane and in height, from its first node, mm, and the motion of its nodes, quanta.
 struct Bounds<R> {
     low: [R; 3],
     high: [R; 3],
+    least: [i32; 3],
+    greatest: [i32; 3],
 }
 
 impl<R: Real> Bounds<R> {
     /// The first node alone.
     #[inline(always)]
     fn new() -> Self {
-        Self { low: [R::from_f64(0.0); 3], high: [R::from_f64(0.0); 3] }
+        let zero = [R::from_f64(0.0); 3];
+        Self { low: zero, high: zero, least: [MOST_MOTION; 3], greatest: [-MOST_MOTION; 3] }
+    }
+
+    /// With the motion of a node.
+    #[inline(always)]
+    fn moves(&mut self, motion: [i32; 3]) {
+        for (k, along) in motion.into_iter().enumerate() {
+            self.least[k] = self.least[k].min(along);
+            self.greatest[k] = self.greatest[k].max(along);
+        }
     }
 
     /// With the end of a vector from the first node.
@@ -168,19 +204,11 @@ impl<'a, R: Real> Grid<'a, R> {
         }
     }
 
-    /// Puts an item into every cell that its box touches, `reach` (mm) around, and says there whether it has `moved`.
+    /// Puts an item into every cell that its box touches, `reach` (mm) around.
     #[inline(always)]
-    fn put<const PERIODIC: bool>(
-        &mut self,
-        io: &Io<R>,
-        item: usize,
-        origin: usize,
-        bounds: Bounds<R>,
-        reach: R,
-        moved: bool,
-    ) {
+    fn put<const PERIODIC: bool>(&mut self, io: &Io<R>, item: usize, origin: usize, bounds: Bounds<R>, reach: R) {
         let Self { params, inverse, counts, lists, boxes, flags } = self;
-        let Bounds { low, high } = bounds;
+        let Bounds { low, high, least, greatest } = bounds;
         let (base, height) = absolute(io, [REFERENCE, QUANTA, REMAINDER], inverse, origin);
         let half = R::from_f64(0.5);
         boxes.item(0, item).copy_from_slice(&[
@@ -190,6 +218,12 @@ impl<'a, R: Real> Grid<'a, R> {
             height + high[2],
             half * (high[0] - low[0]),
             half * (high[1] - low[1]),
+            R::from_i32(least[0]),
+            R::from_i32(least[1]),
+            R::from_i32(least[2]),
+            R::from_i32(greatest[0]),
+            R::from_i32(greatest[1]),
+            R::from_i32(greatest[2]),
         ]);
         let range = |k: usize| {
             let reach = reach * (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt();
@@ -200,10 +234,7 @@ impl<'a, R: Real> Grid<'a, R> {
         for y in y0..=y1 {
             for x in x0..=x1 {
                 let cell = cell_index(params, x, y);
-                let place = counts[cell].fetch_add(1, Ordering::Relaxed) & !MOVED_HERE;
-                if moved {
-                    counts[cell].fetch_or(MOVED_HERE, Ordering::Relaxed);
-                }
+                let place = counts[cell].fetch_add(1, Ordering::Relaxed);
                 if place < params.capacity {
                     lists.set(cell * params.capacity as usize + place as usize, item as u32);
                 } else {
@@ -220,7 +251,7 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let mut grid = Grid::new::<PERIODIC>(io, SLAB_MOVED + 1);
+        let mut grid = Grid::new::<PERIODIC>(io, SLAB_BEFORE + 1);
         let inverse = grid.inverse;
         let surface = Surface::<_, PERIODIC> {
             bodies: bytemuck::cast_slice(io.uints(BODIES)),
@@ -230,7 +261,7 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
             gradient: &io.row.gradient,
             period: grid.params.period,
         };
-        let (slabs, moved) = (io.uints(SLABS), io.uints(SLAB_MOVED));
+        let slabs = io.uints(SLABS);
         let reach = L::Scalar::from_f64(f64::from(grid.params.thread_radius + grid.params.skin));
         for item in items {
             let slab = &slabs[SLAB * item..][..SLAB];
@@ -238,15 +269,14 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
             let origin = surface.node(body, [0, 0], Place { ring: first, slice }).0;
             let last = (first + SLAB_FACES as i32).min(surface.bodies[body].ring as i32);
             let mut bounds = Bounds::new();
-            let mut has_moved = false;
             for ring in first..=last {
                 for slice in [slice, slice + 1] {
                     let (node, shift) = surface.node(body, [0, 0], Place { ring, slice });
                     bounds.grow(&inverse, surface.from_slave(origin, node, shift).1);
-                    has_moved |= moved[node] == 1;
+                    bounds.moves(motion(io, [QUANTA, REMAINDER, SLAB_BEFORE], node));
                 }
             }
-            grid.put::<PERIODIC>(io, item, origin, bounds, reach, has_moved);
+            grid.put::<PERIODIC>(io, item, origin, bounds, reach);
         }
     }
 }
@@ -257,10 +287,10 @@ impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let mut grid = Grid::new::<PERIODIC>(io, BEAM_MOVED + 1);
+        let mut grid = Grid::new::<PERIODIC>(io, BEAM_BEFORE + 1);
         let inverse = grid.inverse;
         let displacement = Displacements::new(io, QUANTA, REMAINDER);
-        let (ends, beams, moved) = (io.uints(ENDS), io.scalars(BEAMS), io.uints(BEAM_MOVED));
+        let (ends, beams) = (io.uints(ENDS), io.scalars(BEAMS));
         let bows = Bows { neighbours: io.uints(NEIGHBOURS), shares: io.scalars(SHARES) };
         let reach = L::Scalar::from_f64(f64::from(2.0 * grid.params.thread_radius + grid.params.skin));
         for item in items {
@@ -271,8 +301,10 @@ impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
             bounds.grow(&inverse, bow);
             bounds.grow(&inverse, add(bow, add(d, change)));
             let (first, last) = (ends[2 * beam] as usize, ends[2 * beam + 1] as usize);
-            let has_moved = moved[first] == 1 || moved[last] == 1;
-            grid.put::<PERIODIC>(io, item, first, bounds, reach, has_moved);
+            for node in [first, last] {
+                bounds.moves(motion(io, [QUANTA, REMAINDER, BEAM_BEFORE], node));
+            }
+            grid.put::<PERIODIC>(io, item, first, bounds, reach);
         }
     }
 }

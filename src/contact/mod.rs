@@ -80,6 +80,8 @@ pub struct Params {
     pub depth: f32,
     /// Numbers that a slot keeps, see [`slot_state`].
     pub state: u32,
+    /// How far bodies may have moved along an axis relative to each other before candidates are searched again, quanta.
+    pub apart: u32,
 }
 
 /// Numbers of a slot: normal force, N, or less what is sure to be left of the gap, mm; with friction then the elastic tangential
@@ -89,6 +91,13 @@ pub const fn slot_state(friction: bool) -> usize {
 }
 /// Most numbers of a slot.
 pub const MOST_STATE: usize = slot_state(true);
+
+/// What a slave or a beam notes of its candidates: found when everything was last searched, or since, or still to be found.
+pub mod found {
+    pub const WITH_ALL: u32 = 0;
+    pub const SINCE: u32 = 1;
+    pub const NEVER: u32 = 2;
+}
 
 /// No candidate in a slot.
 pub const EMPTY: u32 = u32::MAX;
@@ -109,6 +118,8 @@ pub mod status {
     pub const SPEED: usize = 9;
     /// A node whose contact force outgrew its integer.
     pub const CULPRIT: usize = 10;
+    /// Slaves and beams whose candidates were searched.
+    pub const SEARCHED: usize = 11;
     /// Size of the buffer.
     pub const SIZE: usize = 16;
 

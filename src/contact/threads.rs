@@ -9,9 +9,9 @@
 
 use super::bow::Bows;
 use super::friction::slide;
-use super::grid::{BOX, MOVED_HERE, absolute, cell_index, cells, inverse, pull_back};
+use super::grid::{BOX, MOTION, absolute, cell_index, cells, has_moved, inverse, pull_back};
 use super::penalty::{Press, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, press, virial};
-use super::{EMPTY, MOST_STATE, Params, add_pair, add_stiffness, key, of_key, shift, slot_state, status};
+use super::{EMPTY, MOST_STATE, Params, add_pair, add_stiffness, found, key, of_key, shift, slot_state, status};
 use crate::elements::beam2;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
@@ -127,18 +127,18 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
         const ARCS: usize = 8;
         const COUNTS: usize = 9;
         const ITEMS: usize = 10;
-        // only in periodic scenes; else all writes are one number earlier
         const BOXES: usize = 11;
-        let missing = usize::from(!PERIODIC);
         let params: Params = io.params();
         let constant = L::Scalar::from_f64;
         let scene = Scene::<_, PERIODIC>::new(io, params.period);
         let (threads, arcs) = (io.uints(THREADS), io.scalars(ARCS));
         let (counts, lists) = (io.uints(COUNTS), io.uints(ITEMS));
-        let boxes = if PERIODIC { io.scalars(BOXES) } else { &[] };
-        let mut keys = io.own::<u32>(12 - missing);
-        let mut states = io.own::<L::Scalar>(13 - missing);
-        let flags = io.atomic_uints(14 - missing);
+        let boxes = io.scalars(BOXES);
+        let mut keys = io.own::<u32>(12);
+        let mut states = io.own::<L::Scalar>(13);
+        let mut when = io.own::<u32>(14);
+        let flags = io.atomic_uints(15);
+        let apart = L::Scalar::from_i32(params.apart as i32);
         let inverse = inverse::<_, PERIODIC>(&io.row.gradient);
         let period = params.period.map(|p| L::Scalar::from_i32(p) * constant(QUANTUM));
         let reach = constant(f64::from(2.0 * params.thread_radius + params.skin));
@@ -159,25 +159,35 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
                 flags[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
                 continue;
             }
-            let (mut has_moved, mut full) = (false, false);
+            let when = when.at(0, beam);
+            let own = &boxes[BOX * (params.slabs as usize + beam)..][..BOX];
+            let (least, greatest) = ([0, 1, 2].map(|k| own[MOTION + k]), [0, 1, 2].map(|k| own[MOTION + 3 + k]));
+            let (mut searches, mut full) = (*when != found::WITH_ALL, false);
             for y in y0..=y1 {
                 for x in x0..=x1 {
-                    let listed = counts[cell_index(&params, x, y)];
-                    has_moved |= listed & MOVED_HERE != 0;
-                    full |= listed & !MOVED_HERE > params.capacity;
+                    let cell = cell_index(&params, x, y);
+                    full |= counts[cell] > params.capacity;
+                    if searches || full {
+                        continue;
+                    }
+                    let items = &lists[cell * params.capacity as usize..][..counts[cell] as usize];
+                    searches = items
+                        .iter()
+                        .filter(|near| **near > params.slabs + beam as u32)
+                        .any(|near| has_moved(&boxes[BOX * *near as usize..][..BOX], least, greatest, apart));
                 }
             }
             // overflow keeps what was known, and is searched again with larger tables
-            if !has_moved || full {
+            if !searches || full {
                 continue;
             }
             // in ascending order
-            let mut found = [EMPTY; MOST_PAIRS];
+            let mut pairs = [EMPTY; MOST_PAIRS];
             let mut count = 0;
             for y in y0..=y1 {
                 for x in x0..=x1 {
                     let cell = cell_index(&params, x, y);
-                    let listed = (counts[cell] & !MOVED_HERE) as usize;
+                    let listed = counts[cell] as usize;
                     for &near in &lists[cell * params.capacity as usize..][..listed] {
                         if near < params.slabs + beam as u32 + 1 {
                             continue;
@@ -208,16 +218,16 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
                             continue;
                         }
                         let key = key(other, image);
-                        let place = found[..count].partition_point(|known| *known < key);
-                        if found[..count].get(place) == Some(&key) {
+                        let place = pairs[..count].partition_point(|known| *known < key);
+                        if pairs[..count].get(place) == Some(&key) {
                             continue;
                         }
                         if count == MOST_PAIRS {
                             full = true;
                             continue;
                         }
-                        found.copy_within(place..count, place + 1);
-                        found[place] = key;
+                        pairs.copy_within(place..count, place + 1);
+                        pairs[place] = key;
                         count += 1;
                     }
                 }
@@ -234,10 +244,12 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
                 old.1[..size].copy_from_slice(state);
             }
             for (slot, (key, state)) in keys.iter_mut().zip(states.chunks_exact_mut(size)).enumerate() {
-                *key = found[..count].get(slot).copied().unwrap_or(EMPTY);
+                *key = pairs[..count].get(slot).copied().unwrap_or(EMPTY);
                 let known = old.iter().find(|(old, _)| *key != EMPTY && old == key);
                 state.copy_from_slice(&known.map_or([constant(0.0); MOST_STATE], |(_, state)| *state)[..size]);
             }
+            *when = if *when == found::NEVER { found::WITH_ALL } else { found::SINCE };
+            flags[status::SEARCHED].fetch_add(1, Ordering::Relaxed);
         }
     }
 }

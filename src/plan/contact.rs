@@ -7,6 +7,8 @@ use super::threads::Threads;
 use super::ties::Ties;
 use super::{Builder, Capacity, Slave, after, beside, coded, own, thickness, waiting};
 use crate::case::effects::Contact;
+use crate::contact::found::NEVER;
+use crate::contact::travel::SKIN_APART;
 use crate::contact::{EMPTY, Params, candidates, grid, penalty, slot_state, threads, tie};
 use crate::kernel::buffer::{Buffer, Initial, Kind};
 use crate::kernel::position::quanta;
@@ -19,6 +21,8 @@ pub(super) struct ContactBuffers {
     pub sums: Buffer,
     pub keys: Buffer,
     pub state: Buffer,
+    /// See [`crate::contact::found`].
+    pub found: Buffer,
 }
 
 /// What contact adds to a plan.
@@ -49,8 +53,8 @@ pub(super) struct ContactScene<'a> {
     pub velocity: Buffer,
     pub mass: Buffer,
     pub status: Buffer,
-    /// Nodes that have moved, in a scene that searches.
-    pub moved: Option<Buffer>,
+    /// Displacements when everything was last searched, in quanta, in a scene that searches.
+    pub before: Option<Buffer>,
     pub ends: Buffer,
     pub beams: Buffer,
 }
@@ -130,7 +134,7 @@ impl ContactScene<'_> {
         let rings = b.indices("ring lines", surfaces.ring_lines.clone());
         let slabs = b.indices("slabs", surfaces.slabs.clone());
         let mut reads = [&self.place()[..], &[slabs, bodies, rings]].concat();
-        reads.extend(self.moved);
+        reads.extend(self.before);
         let kernel = flagged!(grid::FillSlabs; self.active.periodic);
         let count = surfaces.slabs.len() / grid::SLAB;
         let stage = coded(kernel, "yarns to grid", count, 32, &reads, &self.to_grid(search), params);
@@ -142,7 +146,7 @@ impl ContactScene<'_> {
     fn beams_to_grid(&self, b: &mut Builder, search: &Search, slabs: usize, bows: [Buffer; 2], params: Params) {
         let beams = self.threads.thread.len();
         let mut reads = [&self.place()[..], &[self.ends, self.beams], &bows].concat();
-        reads.extend(self.moved);
+        reads.extend(self.before);
         let kernel = flagged!(grid::FillBeams; self.active.periodic);
         let stage = coded(kernel, "threads to grid", beams, 32, &reads, &self.to_grid(search), params);
         // what fills the grid may run side by side
@@ -175,8 +179,9 @@ impl ContactScene<'_> {
             &[search.counts, search.lists, search.boxes],
         ]
         .concat();
-        near.extend(self.moved);
-        let found = [keys_own, state_own, self.status()];
+        near.extend(self.before);
+        let found = b.add("when candidates were found", Kind::Uint, count, true, Initial::Uint(vec![NEVER; count]));
+        let searched = [keys_own, state_own, (found, own(1, 1)), self.status()];
         let touched =
             [&[slaves, values, tables.bodies, tables.rings][..], &self.place(), &[self.velocity, self.mass]].concat();
         let pushed = [
@@ -195,14 +200,14 @@ impl ContactScene<'_> {
         let mut waits = true;
         for (thread, items, search_name, name) in kinds.into_iter().filter(|kind| !kind.1.is_empty()) {
             let kernel = flagged!(candidates::Candidates; thread, periodic);
-            let stage = coded(kernel, search_name, items.len(), 64, &near, &found, params);
+            let stage = coded(kernel, search_name, items.len(), 64, &near, &searched, params);
             b.plan.search.push(Stage { first: items.start, waits, ..stage });
             let kernel = flagged!(penalty::Penalty; thread, friction, periodic);
             let stage = coded(kernel, name, items.len(), 64, &touched, &pushed, params);
             b.plan.step.push(Stage { first: items.start, ..stage });
             waits = false;
         }
-        ContactBuffers { sums, keys, state }
+        ContactBuffers { sums, keys, state, found }
     }
 
     /// Beams against beams.
@@ -222,11 +227,11 @@ impl ContactScene<'_> {
         let state = b.add("beam pair state", Kind::Scalar, size * slots * beams, true, Initial::Zero);
         let sums = b.scratch("beam pair sums", penalty::sums(friction, periodic) * beams);
         let common = [&[self.ends, self.beams][..], &self.place(), &bows].concat();
-        let mut reads = [&common[..], &[of, arcs, search.counts, search.lists]].concat();
-        reads.extend(periodic.then_some(search.boxes));
+        let reads = [&common[..], &[of, arcs, search.counts, search.lists, search.boxes]].concat();
+        let found = b.add("when pairs were found", Kind::Uint, beams, true, Initial::Uint(vec![NEVER; beams]));
         let keys_own = (keys, own(1, slots));
         let state_own = (state, own(1, size * slots));
-        let writes = [keys_own, state_own, self.status()];
+        let writes = [keys_own, state_own, (found, own(1, 1)), self.status()];
         let kernel = flagged!(threads::Pairs; periodic);
         let stage = coded(kernel, "thread-thread candidates", beams, 32, &reads, &writes, params);
         b.plan.search.push(waiting(stage));
@@ -241,7 +246,7 @@ impl ContactScene<'_> {
         ];
         let kernel = flagged!(threads::Force; friction, periodic);
         b.plan.step.push(coded(kernel, "thread-thread contact", beams, 32, &reads, &writes, params));
-        ContactBuffers { sums, keys, state }
+        ContactBuffers { sums, keys, state, found }
     }
 
     /// Nodes of cut threads that are held; energies and number of ties.
@@ -300,6 +305,8 @@ impl ContactScene<'_> {
             self_arc: self.chosen.self_contact_arc_mm as f32,
             depth: depth.min(f64::from(f32::MAX)) as f32,
             state: slot_state(self.active.friction) as u32,
+            // along each axis, so that it is as much in space
+            apart: quanta(SKIN_APART * self.chosen.skin_mm / libm::sqrt(3.0)) as u32,
         }
     }
 }

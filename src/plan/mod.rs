@@ -99,8 +99,8 @@ pub struct Buffers {
     /// What contact-aware mass adds, tonne.
     pub added_mass: Option<Buffer>,
     pub status: Buffer,
-    /// 1 for nodes that have moved since candidates around them were searched.
-    pub moved: Option<Buffer>,
+    /// Displacements when everything was last searched, in quanta.
+    pub before: Option<Buffer>,
     pub hex_energy: Option<Buffer>,
     pub beam_tension: Option<Buffer>,
     pub bend_energy: Option<Buffer>,
@@ -109,6 +109,8 @@ pub struct Buffers {
     pub contact_sums: Option<Buffer>,
     pub contact_keys: Option<Buffer>,
     pub contact_state: Option<Buffer>,
+    /// See [`crate::contact::found`], of slaves and of beams.
+    pub found: [Option<Buffer>; 2],
     pub pair_sums: Option<Buffer>,
     pub pair_keys: Option<Buffer>,
     pub pair_state: Option<Buffer>,
@@ -304,16 +306,13 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         let quanta = b.add("quanta at the last search", Kind::Int, 3 * nodes, true, Initial::Zero);
         [quanta, b.add("remainder at the last search", Kind::Scalar, 3 * nodes, true, Initial::Zero)]
     });
-    // all of them at the start
-    let moved = searched.map(|_| b.indices("moved", vec![1; nodes]));
+    let name = "displacements at the last search of everything";
+    let before = searched.map(|_| b.add(name, Kind::Int, 3 * nodes, true, Initial::Zero));
     let mut reads = vec![quanta_, remainder, velocity];
     reads.extend(searched.into_iter().flatten());
     let kernel = flagged!(travel::Travel; active.searches());
-    let mut writes: Vec<_> = moved.map(|moved| (moved, own(1, 1))).into_iter().collect();
-    writes.push((status_, Access::Atomic));
-    let skin = effects.contact.as_ref().map_or(0.0, |c| c.skin_mm);
-    let params = travel::Params { moved: (travel::SKIN_MOVED * skin) as f32 };
-    b.plan.watch.push(waiting(coded(kernel, "travel", nodes, NODE_GRAIN, &reads, &writes, params)));
+    let writes = [(status_, Access::Atomic)];
+    b.plan.watch.push(waiting(coded(kernel, "travel", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0])));
 
     // contact
     let contact = effects.contact.as_ref().filter(|_| active.searches() || active.ties).map(|chosen| {
@@ -332,15 +331,15 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             velocity,
             mass,
             status: status_,
-            moved,
+            before,
             ends,
             beams: beam_table,
         };
         scene.add(&mut b)
     });
-    if let (Some([search_quanta, search_remainder]), Some(moved)) = (searched, moved) {
+    if let Some([search_quanta, search_remainder]) = searched {
         let writes = [(search_quanta, own(3, 1)), (search_remainder, own(3, 1))];
-        let reads = [quanta_, remainder, moved];
+        let reads = [quanta_, remainder];
         b.plan.search.push(after::<travel::Remember>("remember", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0]));
     }
 
@@ -515,7 +514,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             correction,
             added_mass,
             status: status_,
-            moved,
+            before,
             hex_energy: hex.energy,
             beam_tension,
             bend_energy: bent.as_ref().map(|bent| bent.energy),
@@ -524,6 +523,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             contact_sums: faces.map(|f| f.sums),
             contact_keys: faces.map(|f| f.keys),
             contact_state: faces.map(|f| f.state),
+            found: [faces, pairs].map(|kind| kind.map(|kind| kind.found)),
             pair_sums: pairs.map(|p| p.sums),
             pair_keys: pairs.map(|p| p.keys),
             pair_state: pairs.map(|p| p.state),

@@ -96,7 +96,7 @@ impl Simulation {
             &mut self.largest_flow,
         ];
         numbers.into_iter().for_each(|x| x.record(record));
-        let counts = [&mut self.step, &mut self.searches, &mut self.diagnosed, &mut self.burst];
+        let counts = [&mut self.step, &mut self.searches, &mut self.searched, &mut self.diagnosed, &mut self.burst];
         counts.into_iter().for_each(|x| x.record(record));
         self.gradient_at_search.record(record);
         self.energies.record(record);
