@@ -419,7 +419,7 @@ impl Simulation {
         }
     }
 
-    /// Searches contact everywhere.
+    /// Searches contact everywhere, and notes where nodes are: until the next time, their motion is counted from here.
     fn search_all(&mut self) -> Result<()> {
         let b = &self.model.buffers;
         if let Some(before) = b.before {
@@ -438,8 +438,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Runs the contact search where bodies have moved relative to each other, with larger tables if they overflow: what does not fit is left as it
-    /// was, so that a search that overflows leaves nothing that the next one does not find again.
+    /// Runs the contact search where bodies have moved relative to each other, with larger tables if they overflow: what does not
+    /// fit is left as it was, so that a search that overflows leaves nothing that the next one does not find again.
     fn search(&mut self) -> Result<()> {
         if self.model.plan.search.is_empty() {
             return Ok(());
