@@ -390,13 +390,14 @@ fn complaint(end: &End) -> Option<String> {
     }
 }
 
-/// Share of accepted cases that are quiet and right, in per cent. Of the first twenty fabrics of seeds 1 to 5 it is 98: one is stopped
-/// by the energy guard where it is looked at more often, and of one the thermal work is off by 2.7 %.
+/// Share of accepted cases that are quiet and right, in per cent. Of the first forty fabrics of seed 1 and the first twenty of seeds 2
+/// to 4 it is 97: two are stopped by the energy guard where they are looked at more often, and the energy of one is 3.1 % from
+/// that of its mirror image.
 const HELD: u64 = 95;
 
 #[test]
 fn random_fabrics_run_quietly_and_hold_their_checks() {
-    let (wanted, seed) = (number("TRICOT_FABRICS", 20), number("TRICOT_SEED", 1));
+    let (wanted, seed) = (number("TRICOT_FABRICS", 40), number("TRICOT_SEED", 1));
     let mut bytes = [0; 32];
     bytes[..8].copy_from_slice(&seed.to_le_bytes());
     let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &bytes);

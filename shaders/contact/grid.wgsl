@@ -123,10 +123,12 @@ fn motion_of(item: u32) -> Motion {
     );
 }
 
-// Whether an item, by its box, has moved by more than `apart` relative to something else.
+// Whether an item, by its box, has moved by more than `apart` relative to something else, or either by more than is told of.
 fn has_moved(item: u32, other: Motion, apart: f32) -> bool {
     let own = motion_of(item);
-    return any(max(own.greatest - other.least, other.greatest - own.least) > vec3<f32>(apart));
+    let most = vec3<f32>(f32(MOST_MOTION));
+    let is_far = any(min(own.least, other.least) <= -most) || any(max(own.greatest, other.greatest) >= most);
+    return is_far || any(max(own.greatest - other.least, other.greatest - own.least) > vec3<f32>(apart));
 }
 #endif
 

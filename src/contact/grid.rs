@@ -137,10 +137,17 @@ pub fn motion<R: Real>(io: &Io<R>, bindings: [usize; 3], node: usize) -> [i32; 3
     [along(0), along(1), along(2)]
 }
 
-/// Whether an item, by its box, has moved by more than `apart` relative to something that has moved between `low` and `high`.
+/// Whether an item, by its box, has moved by more than `apart` relative to something that has moved between `low` and `high`, or
+/// either by more than is told of.
 #[inline(always)]
 pub fn has_moved<R: Real>(bounds: &[R], low: [R; 3], high: [R; 3], apart: R) -> bool {
-    let beyond = |k: usize| (bounds[MOTION + 3 + k] - low[k]).max(high[k] - bounds[MOTION + k]) > apart;
+    let most = R::from_i32(MOST_MOTION);
+    let beyond = |k: usize| {
+        let (least, greatest) = (bounds[MOTION + k].min(low[k]), bounds[MOTION + 3 + k].max(high[k]));
+        (bounds[MOTION + 3 + k] - low[k]).max(high[k] - bounds[MOTION + k]) > apart
+            || least <= -most
+            || greatest >= most
+    };
     beyond(0) || beyond(1) || beyond(2)
 }
 

@@ -154,28 +154,34 @@ impl Layout {
     }
 
     /// Height where legs begin to turn around each other: a little above the lower corner of the warp, or as far below that
-    /// they keep their distance from it; at the lowest half way to the weft.
+    /// they keep their distance from it, if they then keep it from the weft as well.
     fn turn(&self) -> f64 {
-        let corner = [(self.pitch[0] - self.warp.width) / 2.0, self.middle[0] - self.warp.edge()];
-        let is_clear = |turn: f64| {
-            (0..=200)
-                .map(|i| self.turning(turn, -1.0, 1.0, f64::from(i) / 200.0))
-                .all(|[xi, _, z]| libm::hypot(corner[0] + xi, (corner[1] - z).max(0.0)) >= 0.995 * self.stand_off)
+        let corner = |axis: usize, section: &Section| (self.pitch[axis] - section.width) / 2.0;
+        let [beside_warp, beside_weft] = [corner(0, &self.warp), corner(1, &self.weft)];
+        let [below, above] = [self.middle[0] - self.warp.edge(), self.middle[1] + self.weft.edge()];
+        let are_clear = |turn: f64| {
+            let leg = (0..=200).map(|i| self.turning(turn, -1.0, 1.0, f64::from(i) / 200.0));
+            let [warp, weft] = leg.fold([f64::INFINITY; 2], |[warp, weft], [xi, eta, z]| {
+                let from_warp = libm::hypot(beside_warp + xi, (below - z).max(0.0));
+                let from_weft = libm::hypot(beside_weft - eta, (z - above).max(0.0));
+                [warp.min(from_warp), weft.min(from_weft)]
+            });
+            [warp, weft].map(|distance| distance >= 0.995 * self.stand_off)
         };
-        let [mut high, mut low] =
-            [self.middle[0] - 0.9 * self.warp.edge(), 0.5 * (corner[1] + self.middle[1] + self.weft.edge())];
-        if is_clear(high) {
-            return high;
+        let first = self.middle[0] - 0.9 * self.warp.edge();
+        if are_clear(first)[0] {
+            return first;
         }
+        let [mut high, mut low] = [first, 0.5 * (below + above)];
         for _ in 0..40 {
             let middle = 0.5 * (low + high);
-            if is_clear(middle) {
+            if are_clear(middle)[0] {
                 low = middle;
             } else {
                 high = middle;
             }
         }
-        low
+        if are_clear(low) == [true; 2] { low } else { first }
     }
 
     /// Half of a loop from the top of a leg to the middle of the head, `[ξ, η, z]` with ξ from the wale outwards and η from
