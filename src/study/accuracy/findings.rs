@@ -50,8 +50,8 @@ impl Findings {
             measures.iter().map(|m| results.map_or_else(Curve::new, |results| results.curve(m))).collect()
         };
         let (reference, itself) = (curves(of(Role::Reference)), curves(default));
-        let scatter = |belongs: &dyn Fn(Role) -> bool| -> Vec<f64> {
-            let runs = rows.iter().filter(|row| belongs(row.point.role)).filter_map(|row| row.results.as_ref());
+        let scatter = |belongs: &dyn Fn(&Row) -> bool| -> Vec<f64> {
+            let runs = rows.iter().filter(|row| belongs(row)).filter_map(|row| row.results.as_ref());
             let runs: Vec<Vec<Curve>> = runs.map(|results| curves(Some(results))).collect();
             let apart = |k: usize| {
                 let curves: Vec<&[[f64; 2]]> = runs.iter().map(|curves| curves[k].as_slice()).collect();
@@ -59,8 +59,8 @@ impl Findings {
             };
             (0..measures.len()).map(apart).collect()
         };
-        let chance = scatter(&|role| matches!(role, Role::Default | Role::Chance));
-        let places = scatter(&|role| matches!(role, Role::Default | Role::Places));
+        let chance = scatter(&Row::is_alike);
+        let places = scatter(&|row| matches!(row.point.role, Role::Default | Role::Places));
         let places = places.into_iter().zip(&chance).map(|(places, chance)| places.max(*chance)).collect();
         let from = |own: &[Curve], other: &[Curve]| own.iter().zip(other).map(|(a, b)| difference(a, b)).collect();
         let compared: Vec<[Vec<Option<Difference>>; 2]> = rows
