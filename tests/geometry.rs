@@ -146,6 +146,35 @@ fn beams_are_tagged_as_loop_or_underlap() {
     assert_eq!(changes, 8);
 }
 
+/// Numbers of beams of the laps of a thread that begins with a loop.
+fn beams_of_laps(mesh: &Mesh, thread: usize) -> Vec<usize> {
+    let runs: Vec<usize> = mesh.threads[thread].parts.chunk_by(|a, b| a == b).map(<[Part]>::len).collect();
+    runs.chunks_exact(2).map(|run| run[0] + run[1]).collect()
+}
+
+#[test]
+fn laps_differ_in_their_beams_unless_they_are_told_not_to() {
+    let of = |variation: f64, finer: f64| {
+        let resolution = json!({ "lap_variation": variation, "finer": finer });
+        let mesh = made(with(case(), &[("/resolution", resolution)]), fabric(0.03, 0.01)).unwrap();
+        let laps = [0, 1].map(|thread| beams_of_laps(&mesh, thread));
+        println!("± {variation}, {finer} times as fine: {laps:?}");
+        (laps, mesh.nodes)
+    };
+    let (laps, nodes) = of(0.05, 1.0);
+    for thread in &laps {
+        assert_eq!(thread.iter().sum::<usize>(), 240);
+        assert!((0..4).all(|lap| thread[lap] != thread[(lap + 1) % 4] && (57..=63).contains(&thread[lap])));
+    }
+    let all: std::collections::BTreeSet<usize> = laps.iter().flatten().copied().collect();
+    assert!(all.len() > 4 && all.contains(&57) && all.contains(&63), "{all:?}");
+    assert!(nodes == of(0.05, 1.0).1 && nodes == default_mesh().nodes);
+    assert_eq!(of(0.0, 1.0).0, [[60; 4], [60; 4]]);
+    let (fine, _) = of(0.05, 2.0);
+    assert!(fine.iter().all(|thread| thread.iter().sum::<usize>() == 480));
+    assert!(fine.iter().flatten().all(|beams| *beams != 120 && (114..=126).contains(beams)));
+}
+
 #[test]
 fn every_loop_holds_both_legs_of_the_next() {
     for lap in ["closed", "open"] {
@@ -278,8 +307,9 @@ fn other_fabrics_are_built_clear_and_interlocked() {
 
 #[test]
 fn a_larger_cell_repeats_the_small_one() {
-    let large = with(case(), &[("/domain/cell", json!({ "warps": 3, "wefts": 6 }))]);
-    let [small, large] = [case(), large].map(|c| made(c, fabric(0.03, 0.01)).unwrap());
+    let alike = || with(case(), &[("/resolution", json!({ "lap_variation": 0 }))]);
+    let large = with(alike(), &[("/domain/cell", json!({ "warps": 3, "wefts": 6 }))]);
+    let [small, large] = [alike(), large].map(|c| made(c, fabric(0.03, 0.01)).unwrap());
     assert_eq!(large.beams(), 3 * 6 * 60);
     let per_lap = |mesh: &Mesh, laps: f64| quality::length(mesh, &mesh.threads[0], None) / laps;
     assert!((per_lap(&small, 4.0) - per_lap(&large, 6.0)).abs() < 1e-6);
@@ -350,6 +380,7 @@ fn what_cannot_be_built_is_refused_with_its_field() {
         (("/resolution", json!({ "slice_mm": 7.0 })), "resolution.slice_mm"),
         (("/resolution", json!({ "slice_mm": 1e-9 })), "resolution"),
         (("/resolution", json!({ "beams_per_lap": 5 })), "resolution.beams_per_lap"),
+        (("/resolution", json!({ "beams_per_lap": 26, "lap_variation": 0.1 })), "resolution.lap_variation"),
     ] {
         let message = refusal(with(case(), &[change]), table(&[]));
         assert!(message.starts_with(field), "{message}");

@@ -162,12 +162,39 @@ fn threads_are_cut_in_the_border_and_bind_whole_loops() {
     }
 }
 
+/// Where laps differ in their beams, every piece of thread has as many as where all are alike, cut laps too.
+#[test]
+fn pieces_keep_their_beams_where_laps_differ() {
+    for sets in [["domain.specimen.warp_angle_deg=45"], ["domain.specimen.warp_angle_deg=90"]] {
+        let [alike, differ] = ["resolution.lap_variation=0", "resolution.lap_variation=0.1"]
+            .map(|variation| mesh(&loaded(SMALL, &[sets[0], variation])));
+        let counts = |mesh: &Mesh| mesh.threads.iter().map(|t| t.count).collect::<Vec<_>>();
+        assert_eq!(counts(&alike), counts(&differ));
+        let laps = |mesh: &Mesh| {
+            let inner = |t: &tricot::mesh::Thread| {
+                let runs: Vec<usize> = t.parts.chunk_by(|a, b| a == b).map(<[Part]>::len).collect();
+                let first = 1 + usize::from(t.parts[runs[0]] == Part::Underlap);
+                let whole = runs.get(first..runs.len() - 1).unwrap_or_default();
+                whole.chunks_exact(2).map(|run| run[0] + run[1]).collect::<Vec<_>>()
+            };
+            mesh.threads.iter().flat_map(inner).collect::<Vec<_>>()
+        };
+        let (same, laps) = (laps(&alike), laps(&differ));
+        assert!(same.len() > 40 && same.iter().all(|beams| *beams == 34));
+        assert!(laps.iter().all(|beams| (31..=37).contains(beams)));
+        let changed = laps.iter().filter(|beams| **beams != 34).count() as f64 / laps.len() as f64;
+        println!("{sets:?}: {:.0} % of {} whole laps differ", 100.0 * changed, laps.len());
+        assert!(changed > 0.5, "{changed}");
+    }
+}
+
 #[test]
 fn threads_start_no_deeper_in_anything_than_those_of_the_cell() {
-    let coarse: Vec<&str> =
-        ["resolution.warp_columns=8", "resolution.weft_columns=4", "resolution.beams_per_lap=34"].to_vec();
+    // laps with other numbers of beams have their nodes at other places
+    let alike = "resolution.lap_variation=0";
+    let coarse = ["resolution.warp_columns=8", "resolution.weft_columns=4", "resolution.beams_per_lap=34", alike];
     let cell = mesh(&loaded("cases/unit_cell_shear.json", &coarse));
-    let small = mesh(&loaded(SMALL, &[]));
+    let small = mesh(&loaded(SMALL, &[alike]));
     let gaps = |mesh: &Mesh, samples: usize| {
         [thread_yarn(mesh, Ply::Warp, samples), thread_yarn(mesh, Ply::Weft, samples), thread_thread(mesh, 0.4)]
             .map(|c| c.unwrap().gap)
@@ -178,7 +205,8 @@ fn threads_start_no_deeper_in_anything_than_those_of_the_cell() {
         assert!((0..3).all(|i| small[i] > cell[i] - 1e-3));
     }
     // nodes are what contact sees
-    assert!(gaps(&small, 1).iter().all(|gap| *gap > -0.002));
+    let shipped = gaps(&mesh(&loaded(SMALL, &[])), 1);
+    assert!(shipped.iter().all(|gap| *gap > -0.002), "{shipped:?}");
 }
 
 #[test]

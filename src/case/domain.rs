@@ -256,6 +256,11 @@ pub struct Resolution {
     /// Beams per lap (a loop and its underlap), graded by curvature. Default 60.
     #[schemars(range(min = 8, max = 10_000))]
     pub beams_per_lap: usize,
+    /// Share of `beams_per_lap` by which laps differ from it, at most: some have more beams and others as many less, so that loops
+    /// do not all slip at once. Rounded to whole beams, at least one unless it is 0, which makes all laps alike. Laps that are
+    /// cut at the edge of a specimen have `beams_per_lap`. Default 0.05.
+    #[schemars(range(min = 0, max = 0.2))]
+    pub lap_variation: f64,
     /// Everything but the layers finer by this factor: columns and beams are multiplied by it, the slice is divided. Default 1.
     #[schemars(range(min = 0.1, max = 10))]
     pub finer: f64,
@@ -263,7 +268,15 @@ pub struct Resolution {
 
 impl Default for Resolution {
     fn default() -> Self {
-        Self { warp_columns: 18, weft_columns: 8, layers: 2, slice_mm: 0.303, beams_per_lap: 60, finer: 1.0 }
+        Self {
+            warp_columns: 18,
+            weft_columns: 8,
+            layers: 2,
+            slice_mm: 0.303,
+            beams_per_lap: 60,
+            lap_variation: 0.05,
+            finer: 1.0,
+        }
     }
 }
 
@@ -277,7 +290,14 @@ impl Resolution {
             layers: self.layers,
             slice_mm: self.slice_mm / self.finer,
             beams_per_lap: times(self.beams_per_lap),
+            lap_variation: self.lap_variation,
             finer: 1.0,
         }
+    }
+
+    /// Most beams that a lap has more or less than [`Self::beams_per_lap`].
+    pub fn lap_spread(&self) -> usize {
+        let spread = (self.lap_variation * self.beams_per_lap as f64).round() as usize;
+        if self.lap_variation > 0.0 { spread.max(1) } else { 0 }
     }
 }

@@ -1,6 +1,7 @@
 //! The periodic cell: straight warps along y above straight wefts along x, bound by closed chains of thread. Nothing is
 //! cut at the border of the cell; what sticks out is what enters on the other side.
 
+use super::laps::Laps;
 use super::section::Section;
 use super::stitch::{self, Layout};
 use super::{MOST_NODES, check, quantised, require};
@@ -8,7 +9,7 @@ use crate::case::Case;
 use crate::case::domain::Resolution;
 use crate::case::fabric::{Fabric, Yarn};
 use crate::error::Result;
-use crate::mesh::{Block, Mesh, Part, Ply, quality};
+use crate::mesh::{Block, Mesh, Ply, quality};
 
 /// Builds a cell of `warps × wefts` yarns.
 pub fn build(case: &Case, fabric: &Fabric, warps: usize, wefts: usize) -> Result<Mesh> {
@@ -24,7 +25,7 @@ pub fn build(case: &Case, fabric: &Fabric, warps: usize, wefts: usize) -> Result
     for j in 0..wefts {
         add_yarn(&mut mesh, Ply::Weft, j, &layout, &fabric.weft, resolution)?;
     }
-    add_threads(&mut mesh, &layout, fabric, resolution.beams_per_lap, warps, wefts)?;
+    add_threads(&mut mesh, &layout, fabric, resolution, warps, wefts)?;
     for (ply, areal_mass) in [(Ply::Warp, fabric.warp.areal_mass_g_m2), (Ply::Weft, fabric.weft.areal_mass_g_m2)] {
         let volume: f64 = mesh.blocks.iter().filter(|b| b.ply == ply).map(|b| quality::volume(&mesh, b)).sum();
         for block in mesh.blocks.iter_mut().filter(|b| b.ply == ply) {
@@ -111,28 +112,25 @@ fn add_threads(
     mesh: &mut Mesh,
     layout: &Layout,
     fabric: &Fabric,
-    beams: usize,
+    resolution: &Resolution,
     warps: usize,
     wefts: usize,
 ) -> Result<()> {
     let path = layout.path()?;
-    let lap: Vec<([f64; 3], (Part, f64))> = path
-        .beams(beams, fabric.stitch.radius_mm)
-        .into_iter()
-        .map(|([from, to], part)| {
-            let [a, b] = [from, to].map(|arc| path.line.at(arc).map(quantised));
-            (a, (part, stitch::excess(to - from, a, b)))
-        })
-        .collect();
+    let laps = Laps::new(&path, resolution, fabric.stitch.radius_mm);
     for i in 0..warps {
         let first = mesh.nodes.len();
         let x = quantised((i as f64 + 0.5) * layout.pitch[0]);
+        let mut beams = Vec::new();
         for j in 0..wefts {
             let y = quantised(j as f64 * layout.pitch[1]);
             let side = if j % 2 == 0 { 1.0 } else { -1.0 };
-            mesh.nodes.extend(lap.iter().map(|(p, _)| [x + side * p[0], y + p[1], p[2]]));
+            for &([from, to], part) in laps.lap(i as i64, j as i64) {
+                let [a, b] = [from, to].map(|arc| path.line.at(arc).map(quantised));
+                mesh.nodes.push([x + side * a[0], y + a[1], a[2]]);
+                beams.push((part, stitch::excess(to - from, a, b)));
+            }
         }
-        let beams = (0..wefts).flat_map(|_| lap.iter().map(|(_, beam)| *beam)).collect();
         mesh.threads.push(stitch::thread(&fabric.stitch, format!("thread {}", i + 1), first, Some([0, 1]), beams));
     }
     Ok(())

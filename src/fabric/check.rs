@@ -61,6 +61,14 @@ pub fn resolution(resolution: &Resolution) -> Result<()> {
             resolution.beams_per_lap
         )
     })?;
+    let fewest = resolution.beams_per_lap - resolution.lap_spread();
+    require(fewest >= FEWEST_BEAMS, "resolution.lap_variation", || {
+        format!(
+            "is {}, which leaves {fewest} of {} beams to some laps, but a lap needs at least {FEWEST_BEAMS}; lower it or \
+             raise resolution.beams_per_lap",
+            resolution.lap_variation, resolution.beams_per_lap
+        )
+    })?;
     positive(resolution.slice_mm, "resolution.slice_mm")
 }
 

@@ -3,6 +3,7 @@
 pub mod cell;
 mod check;
 pub mod inline;
+mod laps;
 pub mod polyline;
 pub mod section;
 pub mod specimen;

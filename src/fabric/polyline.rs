@@ -23,6 +23,10 @@ impl Polyline {
         line
     }
 
+    pub fn points(&self) -> &[Vector] {
+        &self.points
+    }
+
     /// Total length, mm.
     pub fn length(&self) -> f64 {
         self.arc.last().copied().unwrap_or(0.0)

@@ -9,6 +9,7 @@
 //!
 //! In the fabric the origin is the middle of a warp and of a gap between two wefts, where a course of the stitch runs.
 
+use super::laps::Laps;
 use super::section::Section;
 use super::stitch::{self, Layout};
 use super::{MOST_NODES, check, quantised, require};
@@ -46,7 +47,7 @@ pub fn build(case: &Case, fabric: &Fabric, specimen: &Specimen) -> Result<Mesh> 
     for (ply, yarn) in [warp, weft] {
         add_ply(&mut mesh, &cut, &layout, ply, yarn, resolution)?;
     }
-    add_threads(&mut mesh, &cut, &layout, fabric, resolution.beams_per_lap)?;
+    add_threads(&mut mesh, &cut, &layout, fabric, resolution)?;
     check::contact(case, fabric, &mesh)?;
     Ok(mesh)
 }
@@ -224,20 +225,26 @@ fn median(mut values: Vec<f64>) -> f64 {
     if values.len() % 2 == 1 { values[half] } else { 0.5 * (values[half - 1] + values[half]) }
 }
 
-/// Adds the pieces of thread in the rectangle.
-fn add_threads(mesh: &mut Mesh, cut: &Cut, layout: &Layout, fabric: &Fabric, beams: usize) -> Result<()> {
+/// Adds the pieces of thread in the rectangle. Laps of which both of a pair are whole differ in their beams: so every piece has
+/// as many as if all laps were alike, and pieces of one length can be solved side by side.
+fn add_threads(mesh: &mut Mesh, cut: &Cut, layout: &Layout, fabric: &Fabric, resolution: &Resolution) -> Result<()> {
     let path = layout.path()?;
-    let lap = path.beams(beams, fabric.stitch.radius_mm);
+    let laps = Laps::new(&path, resolution, fabric.stitch.radius_mm);
     let [px, py] = layout.pitch;
     let [threads, courses] = [(0, px), (1, py)].map(|(axis, pitch)| (cut.reach(axis) / pitch).ceil() as i64 + 1);
     let mut number = 0;
     for i in -threads..=threads {
-        let at = |course: i64, arc: f64| {
+        let place = |course: i64, [x, y, z]: Vector| {
             let side = if course % 2 == 0 { 1.0 } else { -1.0 };
-            let [x, y, z] = path.line.at(arc);
             cut.place([i as f64 * px + side * x, course as f64 * py + y, z])
         };
-        let beams = (-courses..=courses).flat_map(|j| lap.iter().map(move |&(arcs, part)| (j, arcs, part)));
+        let at = |course: i64, arc: f64| place(course, path.line.at(arc));
+        let is_whole = |course: i64| path.line.points().iter().all(|p| cut.holds(place(course, *p)));
+        let lap = |course: i64| {
+            let pair = 2 * course.div_euclid(2);
+            if is_whole(pair) && is_whole(pair + 1) { laps.lap(i, course) } else { laps.mean() }
+        };
+        let beams = (-courses..=courses).flat_map(|j| lap(j).iter().map(move |&(arcs, part)| (j, arcs, part)));
         let mut pieces = pieces(cut, beams.map(|(j, arcs, part)| (move |arc| at(j, arc), arcs, part)));
         pieces.retain(|piece| piece.length() >= path.loop_length);
         number += usize::from(!pieces.is_empty());
