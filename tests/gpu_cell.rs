@@ -98,12 +98,12 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 #[test]
 fn a_small_cell_tightens_and_shears_as_on_the_cpu() {
     let Some(device) = device() else { return };
-    let cpu = |quanta: i32| {
-        let perturbed = format!("integration.perturbation_quanta={quanta}");
+    let cpu = |aside_mm: f64| {
+        let perturbed = format!("integration.perturbation_mm={aside_mm}");
         result(simulation(&case(&[&perturbed]), Make::default()).unwrap())
     };
-    let exact = cpu(0);
-    let spread = apart(&cpu(1).forces, &exact.forces).max(apart(&cpu(-1).forces, &exact.forces));
+    let exact = cpu(0.0);
+    let spread = apart(&cpu(1e-3).forces, &exact.forces).max(apart(&cpu(-1e-3).forces, &exact.forces));
     let make = Make { device: Some(device), ..Make::default() };
     let ours = result(simulation(&case(&[]), make).unwrap());
     assert!(ours.touching.iter().all(|n| *n > 0), "a kind of contact is missing");

@@ -120,8 +120,8 @@ fn a_study_says_what_its_runs_say_and_runs_none_of_them_twice() {
     let labels = table.texts("point");
     let expected = [
         "default",
-        "one quantum less",
-        "one quantum more",
+        "a micrometre aside",
+        "a micrometre to the other side",
         "two beams less",
         "one beam less",
         "one beam more",

@@ -159,7 +159,7 @@ fn steps_confirm_the_limit() {
     let cube = block("cube", [2, 2, 2], [[0.0; 3], [1.0; 3]], 1e-9, neo_hookean(100.0, 0.3));
     let mut case = scene(json!([cube]), json!([]));
     case["steps"] = json!([{ "hold": { "time_s": 1e-6 } }]);
-    case["integration"] = json!({ "perturbation_quanta": 10000, "energy_tolerance": 100 });
+    case["integration"] = json!({ "perturbation_mm": 0.001, "energy_tolerance": 100 });
     for lines in [json!({}), Value::Null] {
         case["effects"]["fibre_lines"] = lines;
         let mut scene = start(&case, F64);

@@ -108,9 +108,11 @@ pub struct Integration {
     /// goes on from there with half the time step. With 0 the guard stops it. Default 0.
     #[schemars(range(min = 0, max = 20))]
     pub retries: usize,
-    /// Offset of one node by so many position quanta (2⁻²³ mm) at the start: measures how far runs scatter by chance. Default 0.
-    #[schemars(range(min = -8_388_608, max = 8_388_608))]
-    pub perturbation_quanta: i32,
+    /// Largest displacement of nodes at the start along each axis, mm: measures how far runs scatter by chance. Every body moves by
+    /// a smooth pattern of its own that strains no fibres: yarns across their fibres, threads in all directions, differently from
+    /// lap to lap, prescribed nodes not at all. The negative number mirrors the pattern. Default 0.
+    #[schemars(range(min = -0.01, max = 0.01))]
+    pub perturbation_mm: f64,
 }
 
 impl Integration {
@@ -132,7 +134,7 @@ impl Default for Integration {
             energy_tolerance: 0.1,
             penetration_tolerance: 0.5,
             retries: 0,
-            perturbation_quanta: 0,
+            perturbation_mm: 0.0,
         }
     }
 }

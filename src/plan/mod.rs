@@ -9,6 +9,7 @@ mod conditions;
 mod contact;
 mod effects;
 mod hexes;
+mod perturbation;
 mod shapes;
 mod solids;
 mod surfaces;
@@ -245,8 +246,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     // state of nodes
     let planes: [Vec<i32>; 3] = std::array::from_fn(|k| mesh.nodes.iter().map(|x| quanta(x[k])).collect());
     let reference = b.add("reference position", Kind::Int, 3 * nodes, false, Initial::Int(planes.concat()));
-    let mut start = vec![0; 3 * nodes];
-    start[2 * nodes + nodes / 2] = case.integration.perturbation_quanta;
+    let start = perturbation::start(mesh, case.integration.perturbation_mm, &conditions);
     let quanta_ = b.add("displacement quanta", Kind::Int, 3 * nodes, true, Initial::Int(start));
     let remainder = b.add("displacement remainder", Kind::Scalar, 3 * nodes, true, Initial::Zero);
     let velocity = b.add("velocity", Kind::Scalar, 3 * nodes, true, Initial::Scalar(initial_velocity(mesh)));

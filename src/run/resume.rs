@@ -61,7 +61,7 @@ pub fn may_differ(place: &str, phases: usize) -> bool {
     match place.split_once('.') {
         None => matches!(place, "title" | "accuracy" | "output"),
         Some(("steps", n)) => later(n),
-        Some(("integration", name)) => !matches!(name, "precision" | "perturbation_quanta" | "hexahedra" | "hourglass"),
+        Some(("integration", name)) => !matches!(name, "precision" | "perturbation_mm" | "hexahedra" | "hourglass"),
         Some(_) => false,
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Each variant is run to its end beside the scene as it is, and its curves are compared with those of the scene. Times of the
 //! step are not taken from these runs, which meet whatever else the machine does at different moments: a variant and the scene
-//! take turns from where the last load step begins. One variant has every effect and starts a quantum of position aside: changes
+//! take turns from where the last load step begins. One variant has every effect and starts a micrometre aside: changes
 //! as small as its own are chance.
 
 use super::difference::difference;
@@ -27,7 +27,7 @@ const TURN_S: f64 = 0.05;
 /// Steps of a turn.
 const STEPS: [u64; 2] = [64, 1024];
 /// What the variant that has every effect is called.
-const NOTHING: &str = "nothing (a quantum aside)";
+const NOTHING: &str = "nothing (a micrometre aside)";
 
 /// What a study of effects is asked for.
 #[derive(Debug, Clone)]
@@ -112,10 +112,10 @@ fn plain(loaded: &Loaded, options: &Options) -> Loaded {
     plain
 }
 
-/// The same scene with a node a quantum further.
+/// The same scene with its bodies up to a micrometre aside.
 fn aside(scene: &Loaded) -> Loaded {
     let mut aside = scene.clone();
-    aside.case.integration.perturbation_quanta += 1;
+    aside.case.integration.perturbation_mm += 1e-3;
     aside
 }
 

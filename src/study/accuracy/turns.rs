@@ -39,7 +39,7 @@ const WEFT: &str = "resolution.weft_columns";
 const SLICE: &str = "resolution.slice_mm";
 const LARGEST_DT: &str = "integration.dt_max_s";
 const PRECISION: &str = "integration.precision";
-const QUANTA: &str = "integration.perturbation_quanta";
+const PERTURBATION: &str = "integration.perturbation_mm";
 const MASS: &str = "effects.contact_mass";
 const MASS_FACTOR: &str = "effects.contact_mass.factor";
 const LEAST_LIMIT: &str = "effects.contact_mass.least_limit_s";
@@ -77,10 +77,10 @@ pub const CHECK: Turn = turn(
     ],
 );
 
-/// Runs that differ from the case by chance.
+/// Runs that differ from the case by chance: everything starts up to a micrometre aside.
 pub const CHANCE: [Turn; 2] = [
-    turn("chance", "one quantum less", &[(QUANTA, To("-1"))]),
-    turn("chance", "one quantum more", &[(QUANTA, To("1"))]),
+    turn("chance", "a micrometre aside", &[(PERTURBATION, To("1e-3"))]),
+    turn("chance", "a micrometre to the other side", &[(PERTURBATION, To("-1e-3"))]),
 ];
 
 /// Runs whose nodes of threads lie elsewhere, on a mesh as fine as that of the case: loops slip a little earlier or later in each.
