@@ -217,8 +217,8 @@ fn a_disk_that_takes_no_more_is_named() {
     let dir = folder.path().join("cell");
     let run = program(&dir, &["output.rows_per_step=40"]);
     let mut shell = Command::new("sh");
-    // 128 blocks of 512 or 1024 bytes: the first frame fits, the second does not
-    shell.args(["-c", "trap '' XFSZ; ulimit -f 128; exec \"$@\"", "sh"]);
+    // 256 blocks of 512 or 1024 bytes: the first frame fits, the second does not
+    shell.args(["-c", "trap '' XFSZ; ulimit -f 256; exec \"$@\"", "sh"]);
     let output = shell.arg(run.get_program()).args(run.get_args()).output().unwrap();
     let text = message(&output, 4);
     assert!(text.contains("frames/0001-1-pretension.vtu") && text.lines().count() == 1, "{text}");

@@ -27,7 +27,7 @@ fn each_effect_is_turned_off_in_turn_and_compared() {
     let text = effects(&case, &options).unwrap_or_else(|e| panic!("{e}")).text;
     println!("{text}");
     let table = Columns::read(&options.table).unwrap();
-    let names = ["nothing (a micrometre aside)", "thread-yarn contact", "bending", "fibre lines"];
+    let names = ["nothing (a µm aside)", "thread-yarn contact", "bending", "fibre lines"];
     assert_eq!(table.texts("without"), names);
     assert!(names.iter().all(|name| text.contains(name)));
     let ratios = table.numbers("step_time_ratio");

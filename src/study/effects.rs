@@ -27,7 +27,7 @@ const TURN_S: f64 = 0.05;
 /// Steps of a turn.
 const STEPS: [u64; 2] = [64, 1024];
 /// What the variant that has every effect is called.
-const NOTHING: &str = "nothing (a micrometre aside)";
+const NOTHING: &str = "nothing (a µm aside)";
 
 /// What a study of effects is asked for.
 #[derive(Debug, Clone)]
