@@ -329,7 +329,7 @@ impl Simulation {
         self.dt = self.share * self.case.integration.dt_s.unwrap_or(self.case.integration.dt_max_s);
         self.dt_before = self.dt;
         self.search_all()?;
-        self.bend_at_rest();
+        self.threads_at_rest();
         let totals = self.diagnose(self.schedule.row(self.time, self.dt, self.dt_before))?;
         self.guard_step()?;
         self.choose_dt();

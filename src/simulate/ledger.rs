@@ -108,11 +108,13 @@ impl Simulation {
         Ok(self.model.totals.contact.iter().map(|sums| sums.of(&totals, penalty::SUM_ENERGY)).sum())
     }
 
-    /// Bending energy of threads that are not at rest as they are generated: their stage once, before the first step.
-    pub(super) fn bend_at_rest(&mut self) {
-        let Some(energy) = self.model.buffers.bend_energy else { return };
-        let bends = |stage: &&Stage| stage.writes.iter().any(|(buffer, _)| *buffer == energy);
-        let stages: Vec<Stage> = self.model.plan.step.iter().filter(bends).cloned().collect();
+    /// Energy of threads that are not at rest as they are generated or start aside of that: their stages once, before the first
+    /// step.
+    pub(super) fn threads_at_rest(&mut self) {
+        let b = &self.model.buffers;
+        let results = [b.beam_tension, b.bend_energy];
+        let threads = |stage: &&Stage| stage.writes.iter().any(|(buffer, _)| results.contains(&Some(*buffer)));
+        let stages: Vec<Stage> = self.model.plan.step.iter().filter(threads).cloned().collect();
         let row = self.schedule.row(self.time, self.dt, self.dt_before);
         self.backend.run(&stages, &[row]);
     }
