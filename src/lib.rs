@@ -9,7 +9,7 @@
 //! M ẅ = −∫ P(F) : ∇N dV + f_thread + f_contact − α M ẇ      motion, integrated by central differences
 //! P = ∂W/∂F,   W = elongation + compaction + distortion + longitudinal shear        yarns (Charmetant et al.)
 //! N = EA (l/L₀ − 1 − ε_th),   E_bend = (2 EI/l̄)(tan θ/2 − T₀)²                      threads
-//! f_n = k · penetration,   |f_t| ≤ μ f_n with true stick                            contact
+//! f_contact = −∂Ψ/∂x,   |f_t| ≤ μ f_n with true stick                               contact: Ψ of distances, k each depth
 //! P̄ = (1/V) ∂W/∂F̄ by virtual power,   F_nor = dW_ext/dγ / (A₀ cos γ)                what is measured
 //! ```
 //!
@@ -39,7 +39,7 @@
 //! | [`fabric`] | from parameters to geometry: yarn sections, the path of the stitch, the cell, the specimen |
 //! | [`materials`] | constitutive laws: energy, first Piola stress, stiffness |
 //! | [`elements`] | hexahedra, beams, bending between beams |
-//! | [`contact`] | search and penalty forces with friction |
+//! | [`contact`] | search and forces: points on closed surfaces, lines on lines, friction |
 //! | [`dynamics`] | assembly, fibre lines, integration, limit of the time step |
 //! | [`conditions`] | prescribed motion |
 //! | [`plan`] | the scene as buffers and stages; reading it is reading the algorithm |

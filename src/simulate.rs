@@ -464,7 +464,8 @@ impl Simulation {
                 capacity.cell *= 2;
             }
             if full & status::SLOTS_FULL != 0 {
-                capacity.slots = (capacity.slots * 2).min(16);
+                capacity.faces = (capacity.faces * 2).min(Capacity::MOST_FACES);
+                capacity.slots = (capacity.slots * 2).min(Capacity::MOST_SLOTS);
                 capacity.beam_slots = (capacity.beam_slots * 2).min(MOST_PAIRS);
             }
             self.grow(capacity)?;
@@ -484,16 +485,28 @@ impl Simulation {
     fn grow(&mut self, capacity: Capacity) -> Result<()> {
         let model = plan::build(&self.case, self.friction, &self.mesh, capacity)?;
         let mut backend = self.make.backend(&model)?;
+        // found again
+        let b = &self.model.buffers;
+        let lists: Vec<_> = b.faces.iter().flatten().flat_map(|faces| [Some(faces.near), Some(faces.gaps)]).collect();
         for (old, description) in self.model.plan.buffers.iter().enumerate() {
             let new = model.plan.buffers.iter().position(|d| d.name == description.name);
-            let Some(new) = new.filter(|_| !matches!(description.name, "items of cells" | "cells" | "status")) else {
+            let is_listed = b.found.contains(&Some(Buffer(old))) || lists.contains(&Some(Buffer(old)));
+            let Some(new) =
+                new.filter(|_| !is_listed && !matches!(description.name, "items of cells" | "cells" | "status"))
+            else {
                 continue;
             };
             let bytes = self.backend.bytes(Buffer(old));
             let bytes = if model.plan.buffers[new].len == description.len {
                 bytes
             } else {
-                widen(&bytes, description.len, &backend.bytes(Buffer(new)), &model, self.mesh.beams(), description.name)
+                widen(
+                    &bytes,
+                    description.len,
+                    &backend.bytes(Buffer(new)),
+                    model.plan.buffers[new].len,
+                    self.items_of(old),
+                )
             };
             backend.set_bytes(Buffer(new), &bytes);
         }
@@ -503,6 +516,13 @@ impl Simulation {
         self.backend = backend;
         self.capacity = capacity;
         Ok(())
+    }
+
+    /// Rows of a table that grows with its slots.
+    fn items_of(&self, buffer: usize) -> usize {
+        let b = &self.model.buffers;
+        let kind = b.faces.iter().position(|f| f.is_some_and(|f| [f.keys, f.touches].contains(&Buffer(buffer))));
+        kind.map_or(self.mesh.beams(), |kind| self.model.points[kind].len())
     }
 
     fn clear_travel(&mut self, status: &[u32]) {
@@ -577,11 +597,9 @@ impl Simulation {
     }
 }
 
-/// Slots of an old table in the first places of wider rows of a new one.
-fn widen(old: &[u8], old_len: usize, fresh: &[u8], model: &Model, beams: usize, name: &str) -> Vec<u8> {
+/// Slots of an old table in the first places of wider rows of a new one: lengths in numbers, and how many rows.
+fn widen(old: &[u8], old_len: usize, fresh: &[u8], new_len: usize, items: usize) -> Vec<u8> {
     let mut new = fresh.to_vec();
-    let new_len = model.plan.buffers.iter().find(|d| d.name == name).map_or(0, |d| d.len);
-    let items = if name.starts_with("beam pair") { beams } else { model.slaves.len() };
     if items == 0 || !old_len.is_multiple_of(items) || !new_len.is_multiple_of(items) {
         return new;
     }

@@ -45,7 +45,7 @@ fn simulation(case: &Value, make: Make, capacity: Capacity) -> Simulation {
 
 #[test]
 fn a_restored_scene_goes_on_to_the_same_bits() {
-    let tight = Capacity { cell: 12, slots: 2, beam_slots: 2 };
+    let tight = Capacity { cell: 12, faces: 8, slots: 2, beam_slots: 2 };
     for (case, precision, capacity, end) in [
         (short_cell(), Precision::F32, Capacity::default(), 2.5e-4),
         (short_cell(), Precision::F32, tight, 2.5e-4),

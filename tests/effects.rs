@@ -9,9 +9,11 @@ use tricot::case::domain::Domain;
 use tricot::case::read::Loaded;
 use tricot::case::steps::Precision::{self, F32, F64};
 use tricot::contact::EMPTY;
+use tricot::contact::penalty::MADE;
 use tricot::fabric;
 use tricot::kernel::shader::Text;
 use tricot::mesh::Mesh;
+use tricot::plan::Capacity;
 use tricot::run;
 use tricot::simulate::{Make, Simulation};
 
@@ -102,14 +104,14 @@ fn a_scene_without_an_effect_has_no_trace_of_it() {
                 "grid",
                 "buffer cells",
                 "buffer boxes",
-                "buffer slaves",
+                "buffer thread points",
                 "buffer slabs",
                 "last search",
                 "search_quanta",
                 "stage remember",
                 "params.skin",
                 "SUM_",
-                "fn walk",
+                "fn project",
                 "fn closest",
             ],
             &cell,
@@ -117,33 +119,32 @@ fn a_scene_without_an_effect_has_no_trace_of_it() {
         ),
         absent(
             "thread-yarn contact",
-            &["thread-yarn", "faces_within", "const IS_THREAD: bool = true"],
+            &["thread-yarn", "thread points", "CARRIED_BY: u32 = 4u", "KIND: u32 = 0u"],
             &cell,
             &contact(json!({ "thread_yarn": false })),
         ),
         absent(
             "yarn-yarn contact",
-            &["yarn-yarn", "body == own", "const IS_THREAD: bool = false"],
+            &["yarn-yarn", "yarn points", "CARRIED_BY: u32 = 1u", "KIND: u32 = 1u"],
             &cell,
             &contact(json!({ "yarn_yarn": false })),
         ),
         absent(
             "contact of yarns",
-            &[
-                "yarns to grid",
-                "-yarn contact",
-                "buffer bodies",
-                "buffer slabs",
-                "buffer slaves",
-                "ring_lines",
-                "fn walk",
-            ],
+            &["yarns to grid", "-yarn contact", "buffer faces", "buffer slabs", "points", "fn project"],
             &cell,
             &contact(json!({ "thread_yarn": false, "yarn_yarn": false })),
         ),
         absent(
             "thread-thread contact",
-            &["thread-thread", "threads to grid", "beam pair", "arc lengths", "closest_points", "params.thread_thread"],
+            &[
+                "thread-thread",
+                "threads to grid",
+                "beam pair",
+                "neighbours of beams",
+                "distance_of",
+                "params.thread_thread",
+            ],
             &cell,
             &contact(json!({ "thread_thread": false })),
         ),
@@ -250,9 +251,11 @@ fn without_friction_contact_keeps_less() {
     let bytes = |s: &Simulation, names: &[&str]| -> usize {
         s.model.plan.buffers.iter().filter(|b| names.contains(&b.name)).map(|b| 4 * b.len).sum()
     };
-    let state = ["contact state", "beam pair state"];
+    let state = ["beam pair state"];
     assert_eq!(bytes(&rough, &state), 4 * bytes(&smooth, &state));
-    let sums = ["contact sums", "beam pair sums"];
+    let touches = ["touches of thread points", "touches of yarn points"];
+    assert!(bytes(&smooth, &touches) > 0 && 2 * bytes(&rough, &touches) == 5 * bytes(&smooth, &touches));
+    let sums = ["thread contact sums", "yarn contact sums", "beam pair sums"];
     println!("sums of contact: {} bytes with friction, {} without", bytes(&rough, &sums), bytes(&smooth, &sums));
     assert_eq!(bytes(&rough, &sums) / 14, bytes(&smooth, &sums) / 12);
 }
@@ -353,11 +356,11 @@ fn a_coefficient_of_zero_that_no_case_may_have_is_no_effect_either() {
     let kinds: [(&str, Change, Change); 3] = [
         ("thread-yarn contact", |c| c.thread_penalty_n_mm2 = 0.0, |c| c.thread_yarn = false),
         ("yarn-yarn contact", |c| c.yarn_penalty_n_mm3 = 0.0, |c| c.yarn_yarn = false),
-        ("thread-thread contact", |c| c.thread_thread_penalty_n_mm = 0.0, |c| c.thread_thread = false),
+        ("thread-thread contact", |c| c.thread_thread_penalty_n_mm2 = 0.0, |c| c.thread_thread = false),
     ];
     for (kind, zero, off) in kinds {
         // the size of a unit of force follows from the stiffest pair, which must be the same
-        let stiff = with(cell(), &[("/effects/contact", json!({ "thread_thread_penalty_n_mm": 60 }))]);
+        let stiff = with(cell(), &[("/effects/contact", json!({ "thread_thread_penalty_n_mm2": 150 }))]);
         let with = altered(&stiff, &|l| {
             let contact = l.case.effects.contact.as_mut().unwrap();
             contact.thread_penalty_n_mm2 *= 2.0;
@@ -379,7 +382,7 @@ fn a_coefficient_of_zero_that_no_case_may_have_is_no_effect_either() {
     );
     let ties = |free: bool| {
         altered(&specimen, &|l| {
-            l.case.effects.contact.as_mut().unwrap().thread_thread_penalty_n_mm = 0.0;
+            l.case.effects.contact.as_mut().unwrap().tie_n_mm = 0.0;
             if let Domain::Specimen(specimen) = &mut l.case.domain
                 && free
             {
@@ -414,13 +417,17 @@ fn bodies_too_far_apart_have_no_candidates_and_move_as_without_contact() {
         ],
     );
     let on = simulation(&loaded(&far), F32);
-    let keys = on.model.buffers.contact_keys.unwrap();
+    let near = on.model.buffers.faces.map(|faces| faces.unwrap().near);
+    let row = MADE + Capacity::default().faces;
     let mut looked = simulation(&loaded(&far), F32);
     advance(&mut looked, 1e-4);
-    assert!(looked.searches() > 0 && looked.backend().uints(keys).iter().all(|key| *key == EMPTY));
+    assert!(
+        looked.searches() > 0
+            && near.iter().all(|near| looked.backend().uints(*near).chunks_exact(row).all(|list| list[MADE] == EMPTY))
+    );
     // one thread without room to meet itself has no pairs to look for
     assert!(on.model.buffers.pair_keys.is_some());
-    let short = with(far.clone(), &[("/effects/contact", json!({ "self_contact_arc_mm": 10 }))]);
+    let short = with(far.clone(), &[("/domain/mesh/threads/0/radius_mm", json!(1.0))]);
     assert!(simulation(&loaded(&short), F32).model.buffers.pair_keys.is_none());
     let off = simulation(&loaded(&with(far, &[("/effects/contact", Value::Null)])), F32);
     assert_eq!(off.searches(), 0);

@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use tricot::case::steps::Precision::{F32, F64};
-use tricot::contact::{EMPTY, penalty, slot_state};
+use tricot::contact::{EMPTY, penalty};
 use tricot::error::Error;
 use tricot::kernel::buffer::Buffer;
 use tricot::kernel::lane::{Lane, Real};
@@ -90,11 +90,11 @@ fn thrown_node(state: &mut Checkpoint) {
 
 /// Every friction force that there is.
 fn contact_force(state: &mut Checkpoint) {
-    let at = state.header.buffers.iter().position(|(n, _)| n == "contact candidates").unwrap();
+    let at = state.header.buffers.iter().position(|(n, _)| n == "bodies that thread points touch").unwrap();
     let keys: Vec<u32> =
         state.buffers[at].chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-    let used = |slot: usize| keys[slot * penalty::SLOT_KEYS] != EMPTY;
-    f32s(state, "contact state", |i, f| if used(i / slot_state(true)) { f32::NAN } else { f });
+    let used = |slot: usize| keys[slot] != EMPTY;
+    f32s(state, "touches of thread points", |i, f| if used(i / penalty::touch(true)) { f32::NAN } else { f });
 }
 
 fn lost_position(state: &mut Checkpoint) {

@@ -13,7 +13,6 @@ use std::sync::{Arc, LazyLock, OnceLock};
 use tricot::backend::Backend;
 use tricot::backend::cpu::Cpu;
 use tricot::backend::gpu::{Device, Gpu};
-use tricot::contact::penalty::LEAST_FORCE;
 use tricot::contact::{EMPTY, status};
 use tricot::elements::LANES;
 use tricot::kernel::buffer::{Buffer, Description, Kind};
@@ -105,7 +104,9 @@ use Rule::{Column, Equal};
 enum Exception {
     /// Columns are runs of so many numbers: lanes side by side.
     Lanes(usize),
-    /// Columns come again after so many numbers: slots behind each other, whose first number is of several kinds, see [`split`].
+    /// Columns come again after so many numbers.
+    Repeats(usize),
+    /// So they do, of slots behind each other, whose first number is of several kinds, see [`split`].
     Slots(usize),
     /// Parts of equal length, where no stage owns items.
     Planes(usize),
@@ -129,7 +130,8 @@ fn exception(model: &Model, buffer: Buffer) -> Option<Exception> {
         "hex corner forces" | "hex stiffness bounds" | "hex energies" | "hourglass energies" | "hex stress sums" => {
             Exception::Lanes(LANES)
         }
-        "contact state" | "beam pair state" => Exception::Slots(model.slot_state),
+        "touches of thread points" | "touches of yarn points" => Exception::Repeats(model.touch),
+        "beam pair state" => Exception::Slots(model.slot_state),
         "line correction" => Exception::Planes(3),
         "totals" => Exception::Single,
         "contact force" => Exception::Rounded(3),
@@ -172,7 +174,7 @@ fn rules(model: &Model, stage: &Stage, buffer: Buffer, access: Access) -> Vec<Ru
     let items = if is_own(&access) { stage.first..stage.first + stage.count } else { 0..len };
     let (lanes, slots) = match exception {
         Some(Exception::Lanes(lanes)) => (lanes, stride),
-        Some(Exception::Slots(slots)) => (1, slots),
+        Some(Exception::Slots(slots) | Exception::Repeats(slots)) => (1, slots),
         _ => (1, stride),
     };
     let rule = |number: usize| {
@@ -195,7 +197,7 @@ fn rules(model: &Model, stage: &Stage, buffer: Buffer, access: Access) -> Vec<Ru
 fn split(mut slots: Vec<f64>, size: usize) -> Vec<f64> {
     let first: Vec<f64> = slots.iter().copied().step_by(size).collect();
     slots.iter_mut().step_by(size).for_each(|force| *force = force.max(0.0));
-    let mark = |x: &f64| if x.abs() < LEAST_FORCE { *x } else { x.signum() };
+    let mark = |x: &f64| x.signum();
     slots.extend(first.iter().map(|x| x.min(0.0)).chain(first.iter().map(mark)));
     slots
 }
@@ -448,9 +450,11 @@ fn wrong(stage: &str, buffer: &str, number: impl Fn(usize) -> f64, change: impl 
 #[test]
 fn a_wrong_key_beside_empty_slots_is_seen() {
     let key = |place| if place == 3 { 517.0 } else { f64::from(EMPTY) };
-    assert_eq!(wrong("yarn-yarn candidates", "contact candidates", key, |_| ()), None);
-    assert!(wrong("yarn-yarn candidates", "contact candidates", key, |keys| keys[3] = 518.0).is_some());
-    assert!(wrong("yarn-yarn candidates", "when candidates were found", |_| 0.0, |found| found[0] = 1.0).is_some());
+    assert_eq!(wrong("yarn-yarn candidates", "faces near yarns", key, |_| ()), None);
+    assert!(wrong("yarn-yarn candidates", "faces near yarns", key, |keys| keys[3] = 518.0).is_some());
+    assert!(
+        wrong("yarn-yarn candidates", "when faces near yarns were found", |_| 0.0, |found| found[0] = 1.0).is_some()
+    );
 }
 
 #[test]
@@ -481,18 +485,13 @@ fn small_numbers_beside_large_ones_are_seen() {
     let corner = |place: usize| if (place / LANES).is_multiple_of(24) { 1.0 } else { 1e-6 };
     let seen = |place: usize| wrong("hex8", "hex corner forces", corner, |forces| forces[place] += 1e-9).is_some();
     assert!(!seen(LANES - 1) && seen(LANES));
-    // slaves of yarns before those of threads
-    let seen = |stage: &str, by: f64| wrong(stage, "contact sums", |_| 1e9, |sums| sums[0] += by).is_some();
-    assert!(!seen("yarn-yarn contact", 1.0) && seen("thread-yarn contact", 1.0));
 }
 
 #[test]
 fn a_mark_in_a_slot_is_seen_beside_forces() {
     let slots = |first: f64| split(vec![first, 0.5, -10.0, 0.5, 10.0, 0.5], 2);
     assert_eq!(slots(-0.1), [0.0, 0.5, 0.0, 0.5, 10.0, 0.5, -0.1, -10.0, 0.0, -1.0, -1.0, 1.0]);
-    assert_ne!(slots(1e-30)[9..], slots(0.0)[9..]);
-    let mark = |state: &mut [f64]| *state.last_mut().unwrap() += 1e-30;
-    assert!(wrong("thread-yarn contact", "contact state", |_| 0.0, mark).is_some());
+    assert_ne!(slots(-1e-9)[9..], slots(0.0)[9..]);
 }
 
 #[test]

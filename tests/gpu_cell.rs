@@ -191,7 +191,7 @@ fn contact_tables_that_overflow_on_a_device_grow_and_leave_no_trace() {
         cell.advance(1.2e-4, |_| false).unwrap_or_else(|e| panic!("{e}"));
         cell.fluctuations()
     };
-    assert!(hash(Capacity { cell: 6, slots: 1, beam_slots: 1 }) == hash(Capacity::default()));
+    assert!(hash(Capacity { cell: 6, faces: 4, slots: 1, beam_slots: 1 }) == hash(Capacity::default()));
 }
 
 #[test]

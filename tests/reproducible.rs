@@ -48,7 +48,10 @@ fn contact_tables_that_overflow_and_grow_leave_no_trace() {
         simulation.fluctuations()
     };
     let roomy = positions(Capacity::default());
-    for tight in [Capacity { cell: 6, slots: 2, beam_slots: 1 }, Capacity { cell: 12, slots: 1, beam_slots: 2 }] {
+    for tight in [
+        Capacity { cell: 6, faces: 8, slots: 2, beam_slots: 1 },
+        Capacity { cell: 12, faces: 3, slots: 1, beam_slots: 2 },
+    ] {
         assert_eq!(positions(tight), roomy, "{tight:?}");
     }
 }

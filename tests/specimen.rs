@@ -196,8 +196,12 @@ fn threads_start_no_deeper_in_anything_than_those_of_the_cell() {
     let cell = mesh(&loaded("cases/unit_cell_shear.json", &coarse));
     let small = mesh(&loaded(SMALL, &[alike]));
     let gaps = |mesh: &Mesh, samples: usize| {
-        [thread_yarn(mesh, Ply::Warp, samples), thread_yarn(mesh, Ply::Weft, samples), thread_thread(mesh, 0.4)]
-            .map(|c| c.unwrap().gap)
+        [
+            thread_yarn(mesh, Ply::Warp, samples),
+            thread_yarn(mesh, Ply::Weft, samples),
+            thread_thread(mesh, mesh.self_arc()),
+        ]
+        .map(|c| c.unwrap().gap)
     };
     for samples in [1, 8] {
         let [cell, small] = [gaps(&cell, samples), gaps(&small, samples)];

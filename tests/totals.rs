@@ -179,11 +179,19 @@ fn check<R: Run>(case: &Value, until: f64, precision: Precision, rounding: f64) 
         let taken = stage.writes[0].0;
         assert!(backend.scalars(taken).iter().all(|x| *x == 0.0), "{} is not set back", plan.buffers[taken.0].name);
     }
-    let slips = get("slip").into_iter().zip(rows(&get("contact sums"), columns, penalty::SUM_SLIP));
-    let slips: Vec<f64> = slips.map(|(before, more)| before + more).collect();
-    assert!(slips.iter().any(|s| *s > 0.0), "nothing slips");
-    for (got, slip) in backend.scalars(model.buffers.slip.unwrap()).iter().zip(slips) {
-        assert!((got - slip).abs() <= rounding * slip.abs(), "slip {got} instead of {slip}");
+    for (slip, [before, sums]) in model
+        .buffers
+        .slip
+        .into_iter()
+        .flatten()
+        .zip([["slip of thread points", "thread contact sums"], ["slip of yarn points", "yarn contact sums"]])
+    {
+        let slips = get(before).into_iter().zip(rows(&get(sums), columns, penalty::SUM_SLIP));
+        let slips: Vec<f64> = slips.map(|(before, more)| before + more).collect();
+        assert!(slips.iter().any(|s| *s > 0.0), "nothing slips");
+        for (got, slip) in backend.scalars(slip).iter().zip(slips) {
+            assert!((got - slip).abs() <= rounding * slip.abs(), "slip {got} instead of {slip}");
+        }
     }
 }
 

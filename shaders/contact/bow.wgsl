@@ -1,38 +1,107 @@
-// Where a beam is in contact with other beams: its chord, moved out by the mean height of the arc that it stands for.
+// Where a thread is in contact with other threads: a line through its nodes, moved out to the mean of the arcs that its beams stand for.
 // What includes this binds `neighbours` and `shares`, and what `elements/beam2` asks for.
 
 #include "contact/mod"
 #include "elements/beam2"
 
-// From a beam's chord to its line, in the reference and now, mm.
+// Integers of a beam in `neighbours`: the beams before and behind it, its thread, the image in which the first beam of a closed thread
+// follows the last.
+const NEIGHBOURS: u32 = 5u;
+// Numbers of a beam in `shares`: four shares of vectors in the shifts of its nodes; arc length of its middle, its length, length of a
+// closed thread, mm.
+const SHARES_OF: u32 = 7u;
+// Where the arc length is.
+const ARC: u32 = 4u;
+
+// A piece of the line: from the first node of its beam to both its ends, in the reference and now, mm.
+struct Piece {
+    rest: array<vec3<f32>, 2>,
+    now: array<vec3<f32>, 2>,
+}
+
+// From the middle of a beam to that of its piece, in the reference and now, mm.
 struct Bow {
     reference: vec3<f32>,
     current: vec3<f32>,
 }
 
+fn shares_of(beam: u32) -> vec4<f32> {
+    let at = SHARES_OF * beam;
+    return vec4<f32>(shares[at], shares[at + 1u], shares[at + 2u], shares[at + 3u]);
+}
+
+fn piece_ends(share: vec4<f32>, before: vec3<f32>, own: vec3<f32>, behind: vec3<f32>) -> array<vec3<f32>, 2> {
+    let first = before * share.x - own * share.y;
+    let second = own * share.z - behind * share.w;
+    return array<vec3<f32>, 2>(first, own + second);
+}
+
+// The piece of a beam.
+fn piece(beam: u32) -> Piece {
+    let share = shares_of(beam);
+    let before = vector(neighbours[NEIGHBOURS * beam]);
+    let own = vector(beam);
+    let behind = vector(neighbours[NEIGHBOURS * beam + 1u]);
+    let rest = piece_ends(share, before.reference, own.reference, behind.reference);
+    let change = piece_ends(share, before.change, own.change, behind.change);
+    return Piece(rest, array<vec3<f32>, 2>(rest[0] + change[0], rest[1] + change[1]));
+}
+
 fn bow(beam: u32) -> Bow {
-    let before = vector(neighbours[2u * beam]);
-    let behind = vector(neighbours[2u * beam + 1u]);
-    let p = shares[2u * beam];
-    let q = shares[2u * beam + 1u];
-    let rest = before.reference * p - behind.reference * q;
-    return Bow(rest, rest + (before.change * p - behind.change * q));
+    let line = piece(beam);
+    let own = vector(beam);
+    let rest = (line.rest[0] + line.rest[1] - own.reference) * 0.5;
+    return Bow(rest, (line.now[0] + line.now[1] - (own.reference + own.change)) * 0.5);
+}
+
+// Whether two beams are the same thread here and closer along it than `arc` after so many turns of a closed thread.
+fn are_near_after(turns: i32, a: u32, b: u32, image: vec2<i32>, arc: f32) -> bool {
+    let wrap = vec2<i32>(i32(neighbours[NEIGHBOURS * a + 3u]), i32(neighbours[NEIGHBOURS * a + 4u]));
+    let p = SHARES_OF * a + ARC;
+    let q = SHARES_OF * b + ARC;
+    let reach = arc + 0.5 * (shares[p + 1u] + shares[q + 1u]);
+    return all(wrap * turns == image) && abs(shares[q] - shares[p] + f32(turns) * shares[p + 2u]) < reach;
+}
+
+// Whether two beams, the second in an image, are the same thread here, and closer along it than `arc` from end to end.
+fn are_near(a: u32, b: u32, image: vec2<i32>, arc: f32) -> bool {
+    let is_same = neighbours[NEIGHBOURS * a + 2u] == neighbours[NEIGHBOURS * b + 2u];
+    return is_same
+        && (are_near_after(0, a, b, image, arc) || are_near_after(1, a, b, image, arc) || are_near_after(-1, a, b, image, arc));
 }
 
 #if PAIRS
-// Nodes of a point at `s` (0 to 1) on a beam's line, with its weights.
-fn line_nodes(beam: u32, s: f32) -> Weighted {
-    let p = shares[2u * beam];
-    let q = shares[2u * beam + 1u];
-    let first = ends[2u * neighbours[2u * beam]];
-    let last = ends[2u * neighbours[2u * beam + 1u] + 1u];
-    let nodes = vec4<u32>(first, ends[2u * beam], ends[2u * beam + 1u], last);
-    return Weighted(4u, nodes, vec4<f32>(-p, 1.0 - s + p, s + q, -q));
+// The four nodes on which a piece hangs.
+fn nodes_of(beam: u32) -> vec4<u32> {
+    let first = ends[2u * neighbours[NEIGHBOURS * beam]];
+    let last = ends[2u * neighbours[NEIGHBOURS * beam + 1u] + 1u];
+    return vec4<u32>(first, ends[2u * beam], ends[2u * beam + 1u], last);
 }
 
-// The sum of the sizes of these weights.
-fn line_weights(beam: u32) -> f32 {
-    let sum = shares[2u * beam] + shares[2u * beam + 1u];
-    return 1.0 + sum + sum;
+// Weights of these nodes at both ends of the piece.
+fn weights_of(beam: u32) -> array<vec4<f32>, 2> {
+    let share = shares_of(beam);
+    return array<vec4<f32>, 2>(
+        vec4<f32>(-share.x, 1.0 + share.x + share.y, -share.y, 0.0),
+        vec4<f32>(0.0, -share.z, 1.0 + share.z + share.w, -share.w),
+    );
+}
+
+// The largest sum of the sizes of these weights.
+fn most_weights(beam: u32) -> f32 {
+    let share = shares_of(beam);
+    let largest = max(share.x + share.y, share.z + share.w);
+    return 1.0 + largest + largest;
+}
+
+// The beam before another one in an image, and its image; itself at the start of a thread.
+fn before_of(beam: u32, image: vec2<i32>) -> Keyed {
+    let at = NEIGHBOURS * beam;
+    let before = neighbours[at];
+    if before > beam {
+        // the first beam of a closed thread follows the last
+        return Keyed(before, image - vec2<i32>(i32(neighbours[at + 3u]), i32(neighbours[at + 4u])));
+    }
+    return Keyed(before, image);
 }
 #endif

@@ -1,18 +1,18 @@
-// Candidates of each slave node: for every body and image within reach, the face that is closest.
+// The faces near what carries contact points: every face of another body whose box lies within reach of the box of the points.
 
 #define STATUS
-#define BODIES
+#define FACES
+#define POINTS
 #define BEFORE
 #define BOXES
 #include "contact/grid"
-#include "contact/penalty"
 
 #if ROOT
-@group(1) @binding(0) var<storage, read> slaves: array<u32>;
-@group(1) @binding(1) var<storage, read> values: array<f32>;
-@group(1) @binding(2) var<storage, read> slabs: array<u32>;
-@group(1) @binding(3) var<storage, read> bodies: array<u32>;
-@group(1) @binding(4) var<storage, read> ring_lines: array<u32>;
+@group(1) @binding(0) var<storage, read> carriers: array<u32>;
+@group(1) @binding(1) var<storage, read> nodes: array<u32>;
+@group(1) @binding(2) var<storage, read> points: array<f32>;
+@group(1) @binding(3) var<storage, read> slabs: array<u32>;
+@group(1) @binding(4) var<storage, read> faces: array<u32>;
 @group(1) @binding(5) var<storage, read> reference: array<i32>;
 @group(1) @binding(6) var<storage, read> quanta: array<i32>;
 @group(1) @binding(7) var<storage, read> remainder: array<f32>;
@@ -20,258 +20,223 @@
 @group(1) @binding(9) var<storage, read> lists: array<u32>;
 @group(1) @binding(10) var<storage, read> boxes: array<f32>;
 @group(1) @binding(11) var<storage, read> before: array<i32>;
-@group(1) @binding(12) var<storage, read_write> keys: array<u32>;
-@group(1) @binding(13) var<storage, read_write> states: array<f32>;
-@group(1) @binding(14) var<storage, read_write> found_when: array<u32>;
-@group(1) @binding(15) var<storage, read_write> status: array<atomic<u32>>;
+@group(1) @binding(12) var<storage, read_write> near: array<u32>;
+@group(1) @binding(13) var<storage, read_write> found_when: array<u32>;
+@group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
 
-// Bodies that one slave can be near to before the search gives up.
-const MOST: u32 = 16u;
-// A face behind which the slave lies must be closer than one in front by this, mm.
-const CLEARLY: f32 = 0.01;
-// Farther than anything, mm.
-const FAR: f32 = 1e9;
+// Integers of a carrier: its first point, how many it has, and its own body, or EMPTY for a thread.
+const CARRIER: u32 = 3u;
 
-// A face and its distance, mm.
-struct Near {
-    distance: f32,
-    place: Place,
-}
-
-// The best faces of one body found so far.
-struct Best {
-    key: u32,
-    in_front: Near,
-    behind: Near,
-}
-
-// Whether slaves are nodes of threads.
-#if THREAD
-const IS_THREAD: bool = true;
-#else
-const IS_THREAD: bool = false;
-#endif
-
-// A slot: key, ring position, slice, state.
-struct Slot {
-    key: u32,
-    ring: u32,
-    slice: u32,
-    state: vec4<f32>,
-}
-
-// The nearer of two faces; of equally near ones that with the smaller number, so that the order of visits does not matter.
-fn nearer(a: Near, b: Near) -> Near {
-    let smaller = b.place.slice < a.place.slice || (b.place.slice == a.place.slice && b.place.ring < a.place.ring);
-    if b.distance < a.distance || (b.distance == a.distance && smaller) {
-        return b;
-    }
-    return a;
-}
-
-// The ends of the edge between two faces of a slice, seen from the slave.
-struct Edge {
+// Where the points of a carrier are, see the twin.
+struct Place {
     low: vec3<f32>,
     high: vec3<f32>,
+    middle: vec2<f32>,
+    half: vec2<f32>,
+    heights: vec2<f32>,
 }
 
-fn across(slave: u32, body: u32, image: vec2<i32>, ring: i32, slice: i32) -> Edge {
-    return Edge(
-        from_slave(slave, node(body, image, Place(ring, slice))).current,
-        from_slave(slave, node(body, image, Place(ring, slice + 1))).current,
+fn place_of(carrier: u32, base: u32, back: Inverse) -> Place {
+    let first = carriers[CARRIER * carrier];
+    var low = vec3<f32>(1e9);
+    var high = vec3<f32>(-1e9);
+    var low_back = vec2<f32>(1e9);
+    var high_back = vec2<f32>(-1e9);
+    for (var k = 0u; k < carriers[CARRIER * carrier + 1u]; k++) {
+        let offset = point_of(first + k).current;
+        low = min(low, offset);
+        high = max(high, offset);
+        let pulled = pull_back(back, offset);
+        low_back = min(low_back, pulled);
+        high_back = max(high_back, pulled);
+    }
+    let from_base = absolute(back, base);
+    return Place(
+        low,
+        high,
+        from_base.xy + 0.5 * (low_back + high_back),
+        0.5 * (high_back - low_back),
+        vec2<f32>(from_base.z + low.z, from_base.z + high.z),
     );
 }
 
-// The best faces of a slab, whose first one is at `first` around the ring.
-fn best_of(slave: u32, body: u32, image: vec2<i32>, slice: i32, first: i32, reach: f32) -> Best {
-    let nowhere = Near(FAR, Place(0, 0));
-    var best = Best(key(body, image), nowhere, nowhere);
-    var here = across(slave, body, image, first, slice);
-    for (var ring = first; ring < min(first + SLAB_FACES, ring_of(body)); ring++) {
-        let next = across(slave, body, image, ring + 1, slice);
-        let corners = array<vec3<f32>, 4>(here.low, here.high, next.high, next.low);
-        here = next;
-        let middle = ((corners[0] + corners[1]) + (corners[2] + corners[3])) * 0.25;
-        let spread = 0.5 * max(norm(corners[2] - corners[0]), norm(corners[3] - corners[1]));
-        if norm(middle) > reach + spread * 1.1 {
-            continue;
-        }
-        let point = closest(corners);
-        if point.distance > reach {
-            continue;
-        }
-        let face = Near(point.distance, Place(ring, slice));
-        if height(point) >= 0.0 || IS_THREAD && !point.interior {
-            best.in_front = nearer(best.in_front, face);
-        } else if normal_and_distance(point, IS_THREAD).faces && !is_rim(body, face.place, point) {
-            best.behind = nearer(best.behind, face);
-        }
-    }
-    return best;
-}
-
-// An image of a slab within reach of a slave.
+// The image of a slab within reach, if any.
 struct Within {
     yes: bool,
     image: vec2<i32>,
 }
 
-fn within(near: u32, position: vec3<f32>, reach: f32, stretched: vec2<f32>) -> Within {
-    if position.z < boxes[BOX * near + 2u] - reach || position.z > boxes[BOX * near + 3u] + reach {
+fn image_within(place: Place, slab: u32, reach: f32, stretched: vec2<f32>) -> Within {
+    let b = BOX * slab;
+    if place.heights.y < boxes[b + 2u] - reach || place.heights.x > boxes[b + 3u] + reach {
         return Within(false, vec2<i32>(0));
     }
-    let middle = vec2<f32>(boxes[BOX * near], boxes[BOX * near + 1u]);
     var image = vec2<i32>(0);
+    var apart = place.middle - vec2<f32>(boxes[b], boxes[b + 1u]);
 #if PERIODIC
     let period = vec2<f32>(params.period) * QUANTUM;
-    if params.period.x != 0 {
-        image.x = to_i32((position.x - middle.x) / period.x);
+    if params.period.x > 0 {
+        image.x = to_i32(apart.x / period.x);
+        apart.x = apart.x - f32(image.x) * period.x;
     }
-    if params.period.y != 0 {
-        image.y = to_i32((position.y - middle.y) / period.y);
+    if params.period.y > 0 {
+        image.y = to_i32(apart.y / period.y);
+        apart.y = apart.y - f32(image.y) * period.y;
     }
-    let from_middle = abs(position.xy - middle - vec2<f32>(image) * period);
-#else
-    let from_middle = abs(position.xy - middle);
 #endif
-    let room = vec2<f32>(boxes[BOX * near + 4u], boxes[BOX * near + 5u]) + reach * stretched;
-    return Within(!any(from_middle > room), image);
+    let room = place.half + vec2<f32>(boxes[b + 4u], boxes[b + 5u]) + reach * stretched;
+    return Within(!any(abs(apart) > room), image);
+}
+
+// Whether the box of a face, whose corners are seen from the same node, is within reach.
+fn is_near(place: Place, q: array<vec3<f32>, 4>, reach: f32) -> bool {
+    let low = min(min(q[0], q[1]), min(q[2], q[3]));
+    let high = max(max(q[0], q[1]), max(q[2], q[3]));
+    let gap = max(max(low - place.high, place.low - high), vec3<f32>(0.0));
+    return dot(gap, gap) <= reach * reach;
+}
+
+// Adds an entry that is not yet there to a list of `count`, which starts at `first`; returns how many there are, or would be.
+fn add_entry(first: u32, count: u32, entry: u32) -> u32 {
+    let body = body_of(entry);
+    // the first that does not come before it
+    var low = 0u;
+    var high = count;
+    while low < high {
+        let middle = (low + high) / 2u;
+        let known = near[first + middle];
+        let known_body = body_of(known);
+        if known_body < body || known_body == body && known < entry {
+            low = middle + 1u;
+        } else {
+            high = middle;
+        }
+    }
+    if low < count && near[first + low] == entry {
+        return count;
+    }
+    if count < params.faces {
+        for (var to = count; to > low; to--) {
+            near[first + to] = near[first + to - 1u];
+        }
+        near[first + low] = entry;
+    }
+    return count + 1u;
+}
+
+// Bodies in a list.
+fn bodies_in(first: u32, count: u32) -> u32 {
+    var bodies = 0u;
+    var last = EMPTY;
+    for (var i = 0u; i < count; i++) {
+        let body = body_of(near[first + i]);
+        bodies = bodies + select(0u, 1u, body != last);
+        last = body;
+    }
+    return bodies;
+}
+
+// Whether a slab is one of faces of another body, and near; its image.
+fn sees(slab: u32, own: u32, place: Place, reach: f32, stretched: vec2<f32>) -> Within {
+    if slab >= params.slabs || marks(slabs[SLAB * slab]) >> 10u == own {
+        return Within(false, vec2<i32>(0));
+    }
+    return image_within(place, slab, reach, stretched);
+}
+
+// Whether anything in reach has moved relative to the carrier since everything was searched.
+fn searches(carrier: u32, place: Place, xs: vec2<i32>, ys: vec2<i32>, reach: f32, stretched: vec2<f32>) -> bool {
+    let first = carriers[CARRIER * carrier];
+    let own = carriers[CARRIER * carrier + 2u];
+    let moved = motion(carried_by(first, 0u));
+    var least = moved;
+    var greatest = moved;
+    for (var a = 1u; a < CARRIED_BY; a++) {
+        let also = motion(carried_by(first, a));
+        least = min(least, also);
+        greatest = max(greatest, also);
+    }
+    let bounds = Motion(vec3<f32>(least), vec3<f32>(greatest));
+    for (var y = ys.x; y <= ys.y; y++) {
+        for (var x = xs.x; x <= xs.y; x++) {
+            let cell = cell_index(x, y);
+            for (var i = 0u; i < counts[cell]; i++) {
+                let slab = lists[cell * params.capacity + i];
+                if sees(slab, own, place, reach, stretched).yes && has_moved(slab, bounds, f32(params.apart)) {
+                    return true;
+                }
+            }
+        }
+    }
+    return false;
+}
+
+// Lists what is near; returns how many faces.
+fn list_faces(carrier: u32, base: u32, place: Place, xs: vec2<i32>, ys: vec2<i32>, reach: f32, stretched: vec2<f32>) -> u32 {
+    let own = carriers[CARRIER * carrier + 2u];
+    let nowhere = Offset(vec3<f32>(0.0), vec3<f32>(0.0));
+    let first = (MADE + params.faces) * carrier + MADE;
+    var count = 0u;
+    for (var y = ys.x; y <= ys.y; y++) {
+        for (var x = xs.x; x <= xs.y; x++) {
+            let cell = cell_index(x, y);
+            for (var i = 0u; i < counts[cell]; i++) {
+                let slab = lists[cell * params.capacity + i];
+                let seen = sees(slab, own, place, reach, stretched);
+                if !seen.yes {
+                    continue;
+                }
+                let from_face = slabs[SLAB * slab];
+                let to_face = from_face + slabs[SLAB * slab + 1u];
+                for (var face = from_face; face < to_face; face++) {
+                    if is_near(place, corners(face, seen.image, base, nowhere).current, reach) {
+                        count = add_entry(first, count, key(face, seen.image));
+                        if count > params.faces {
+                            return count;
+                        }
+                    }
+                }
+            }
+        }
+    }
+    return count;
 }
 
 fn candidates(item: u32) {
     let back = inverse();
     let stretched = stretch(back);
-    let slave = slaves[SLAVE * item];
-#if THREAD
-#else
-    let own = slaves[SLAVE * item + 1u];
-#endif
-    let reach = values[SLAVE_VALUES * item + 1u] + params.skin;
-    let position = absolute(back, slave);
-    if !(is_finite(position.x) && is_finite(position.y) && is_finite(position.z)) {
+    let base = carried_by(carriers[CARRIER * item], 0u);
+    let reach = points[POINT * carriers[CARRIER * item] + 5u] + params.skin;
+    let place = place_of(item, base, back);
+    if !(is_finite(place.middle.x) && is_finite(place.middle.y) && is_finite(place.heights.x)) {
         atomicOr(&status[FLAGS], NOT_FINITE);
         return;
     }
-    let cell = cell_index(cells(0u, position.x, position.x).x, cells(1u, position.y, position.y).x);
-    let listed = counts[cell];
-    // overflow keeps what was known, and is searched again with larger tables
-    if listed > params.capacity {
-        return;
+    let xs = cells(0u, place.middle.x - place.half.x, place.middle.x + place.half.x);
+    let ys = cells(1u, place.middle.y - place.half.y, place.middle.y + place.half.y);
+    // overflow is searched again with larger tables
+    for (var y = ys.x; y <= ys.y; y++) {
+        for (var x = xs.x; x <= xs.y; x++) {
+            if counts[cell_index(x, y)] > params.capacity {
+                return;
+            }
+        }
     }
     let found_at = found_when[item];
-    if found_at == WITH_ALL {
-        let own_motion = vec3<f32>(motion(slave));
-        var searches = false;
-        for (var i = 0u; i < listed && !searches; i++) {
-            let near = lists[cell * params.capacity + i];
-            searches = near < params.slabs && has_moved(near, Motion(own_motion, own_motion), f32(params.apart))
-                && within(near, position, reach, stretched).yes;
-        }
-        if !searches {
-            return;
-        }
+    if found_at == WITH_ALL && !searches(item, place, xs, ys, reach, stretched) {
+        return;
     }
-    var found: array<Best, MOST>;
-    var count = 0u;
-    var full = false;
-    for (var i = 0u; i < listed; i++) {
-        let near = lists[cell * params.capacity + i];
-        if near >= params.slabs {
-            continue;
-        }
-        let body = slabs[SLAB * near];
-#if THREAD
-#else
-        if body == own {
-            continue;
-        }
-#endif
-        let seen = within(near, position, reach, stretched);
-        if !seen.yes {
-            continue;
-        }
-        var image = seen.image;
-        var slice = i32(slabs[SLAB * near + 1u]);
-#if PERIODIC
-        // a closed yarn goes on through its own images: count its slices on instead
-        let turns = image.x * wrap_of(body).x + image.y * wrap_of(body).y;
-        image = image - turns * wrap_of(body);
-        slice = slice + turns * slices_of(body);
-#endif
-        let first = i32(slabs[SLAB * near + 2u]);
-        let best = best_of(slave, body, image, slice, first, reach);
-        if best.in_front.distance == FAR && best.behind.distance == FAR {
-            continue;
-        }
-        var known = 0u;
-        while known < count && found[known].key != best.key {
-            known++;
-        }
-        if known < count {
-            found[known].in_front = nearer(found[known].in_front, best.in_front);
-            found[known].behind = nearer(found[known].behind, best.behind);
-        } else if count < MOST {
-            found[count] = best;
-            count++;
-        } else {
-            full = true;
-        }
-    }
-    if full || count > params.slots {
+    let first = (MADE + params.faces) * item + MADE;
+    let count = list_faces(item, base, place, xs, ys, reach, stretched);
+    if count > params.faces || bodies_in(first, count) > params.slots {
+        found_when[item] = NEVER;
         atomicOr(&status[FLAGS], SLOTS_FULL);
         return;
     }
-    // sorted by key
-    for (var i = 1u; i < count; i++) {
-        let best = found[i];
-        var to = i;
-        while to > 0u && found[to - 1u].key > best.key {
-            found[to] = found[to - 1u];
-            to--;
-        }
-        found[to] = best;
+    for (var i = count; i < params.faces; i++) {
+        near[first + i] = EMPTY;
     }
-    // new candidates go into the slots; known ones keep their state, and their face while they touch
-    let size = params.state;
-    let first_slot = params.slots * item;
-    var old: array<Slot, MOST>;
-    let known_slots = min(params.slots, MOST);
-    for (var slot = 0u; slot < known_slots; slot++) {
-        let k = SLOT_KEYS * (first_slot + slot);
-        var state = vec4<f32>(0.0);
-        for (var i = 0u; i < size; i++) {
-            state[i] = states[size * (first_slot + slot) + i];
-        }
-        old[slot] = Slot(keys[k], keys[k + 1u], keys[k + 2u], state);
-    }
-    for (var slot = 0u; slot < params.slots; slot++) {
-        var now = Slot(EMPTY, EMPTY, EMPTY, vec4<f32>(0.0));
-        if slot < count {
-            let best = found[slot];
-            var place = best.in_front.place;
-            if best.behind.distance + CLEARLY < best.in_front.distance {
-                place = best.behind.place;
-            }
-            now = Slot(best.key, u32(place.ring), u32(place.slice), vec4<f32>(0.0));
-            for (var i = 0u; i < known_slots; i++) {
-                if old[i].key == best.key {
-                    now.state = old[i].state;
-                    if old[i].state.x > 0.0 {
-                        now.ring = old[i].ring;
-                        now.slice = old[i].slice;
-                    }
-                    break;
-                }
-            }
-        }
-        let k = SLOT_KEYS * (first_slot + slot);
-        keys[k] = now.key;
-        keys[k + 1u] = now.ring;
-        keys[k + 2u] = now.slice;
-        for (var i = 0u; i < size; i++) {
-            states[size * (first_slot + slot) + i] = now.state[i];
-        }
-    }
+    near[first - MADE] = near[first - MADE] + 1u;
     found_when[item] = select(SINCE, WITH_ALL, found_at == NEVER);
     atomicAdd(&status[SEARCHED], 1u);
 }

@@ -1,4 +1,4 @@
-// The grid of the contact search: slabs of yarns and beams, each in every cell that its box touches.
+// The grid of the contact search: slabs of faces and beams, each in every cell that its box touches.
 
 #if clear
 #if ROOT
@@ -11,7 +11,7 @@ fn clear(cell: u32) {
 #else
 #if fill_slabs
 #define STATUS
-#define BODIES
+#define FACES
 #define BEFORE
 #endif
 #if fill_beams
@@ -30,10 +30,8 @@ const BOX: u32 = 12u;
 const MOTION: u32 = 6u;
 // Largest motion that a box tells of, quanta.
 const MOST_MOTION: i32 = 16777216;
-// Integers of a slab: body, slice, first face around the ring.
-const SLAB: u32 = 3u;
-// Faces of a slab at most.
-const SLAB_FACES: i32 = 8;
+// Integers of a slab: its first face, and how many follow each other.
+const SLAB: u32 = 2u;
 // More than rounding moves a place in the plane, mm: an item must not be in too few cells.
 const ROUNDING: f32 = 1e-4;
 
@@ -138,10 +136,9 @@ fn has_moved(item: u32, other: Motion, apart: f32) -> bool {
 @group(1) @binding(2) var<storage, read> remainder: array<f32>;
 #if fill_slabs
 @group(1) @binding(3) var<storage, read> slabs: array<u32>;
-@group(1) @binding(4) var<storage, read> bodies: array<u32>;
-@group(1) @binding(5) var<storage, read> ring_lines: array<u32>;
-@group(1) @binding(6) var<storage, read> before: array<i32>;
-const WRITES: u32 = 7u;
+@group(1) @binding(4) var<storage, read> faces: array<u32>;
+@group(1) @binding(5) var<storage, read> before: array<i32>;
+const WRITES: u32 = 6u;
 #else
 @group(1) @binding(3) var<storage, read> ends: array<u32>;
 @group(1) @binding(4) var<storage, read> beams: array<f32>;
@@ -211,16 +208,13 @@ fn put(item: u32, origin: u32, back: Inverse, bounds: Bounds, reach: f32) {
 fn fill_slabs(item: u32) {
     let back = inverse();
     var bounds = no_bounds();
-    let body = slabs[SLAB * item];
-    let slice = i32(slabs[SLAB * item + 1u]);
-    let first = i32(slabs[SLAB * item + 2u]);
-    let origin = node(body, vec2<i32>(0), Place(first, slice)).node;
-    let last = min(first + SLAB_FACES, ring_of(body));
-    for (var ring = first; ring <= last; ring++) {
-        for (var end = slice; end <= slice + 1; end++) {
-            let seen = node(body, vec2<i32>(0), Place(ring, end));
-            bounds = grow(bounds, back, from_slave(origin, seen).current);
-            bounds = moves(bounds, motion(seen.node));
+    let first = slabs[SLAB * item];
+    let origin = of_coded(faces[FACE * first]).node;
+    let nowhere = Offset(vec3<f32>(0.0), vec3<f32>(0.0));
+    for (var face = first; face < first + slabs[SLAB * item + 1u]; face++) {
+        for (var a = 0u; a < 4u; a++) {
+            bounds = grow(bounds, back, corner(face, a, vec2<i32>(0), origin, nowhere).current);
+            bounds = moves(bounds, motion(of_coded(faces[FACE * face + a]).node));
         }
     }
     put(item, origin, back, bounds, params.thread_radius + params.skin);

@@ -37,9 +37,11 @@ struct Params {
     period: vec2<i32>,
     cells: vec2<u32>,
     capacity: u32,
+    faces: u32,
     slots: u32,
     beam_slots: u32,
     slabs: u32,
+    state: u32,
     origin: vec2<f32>,
     cell: vec2<f32>,
     skin: f32,
@@ -51,8 +53,8 @@ struct Params {
     thread_radius: f32,
     thread_thread: f32,
     self_arc: f32,
+    beside: f32,
     depth: f32,
-    state: u32,
     apart: u32,
 }
 

@@ -1,26 +1,19 @@
-// Penalty contact of slave nodes with the surfaces of yarns, every step, for the candidates of each slave that can touch:
-// nodes of threads with THREAD, else of yarn surfaces.
-// What includes this for `press` and `add_virial` defines PRESS and binds `sums`.
+// Penalty contact of points with the closed surfaces of yarns, every step: points along the beams of a thread with THREAD, else the
+// nodes of yarn surfaces. The energy is in the twin.
+// What includes this for `add_sum` and `add_virial` defines PRESS and binds `sums`.
 
-// Integers of a slave: node, own body (or EMPTY for a thread).
-const SLAVE: u32 = 2u;
-// Numbers of a slave: penalty, N/mm; radius, mm.
-const SLAVE_VALUES: u32 = 2u;
-// Integers of a slot: key, ring position, slice.
-const SLOT_KEYS: u32 = 3u;
 #if penalty
 #define PRESS
 #define STATUS
 #define PAIRS
-#define BODIES
-#define TOUCH
+#define FACES
+#define POINTS
 #define VELOCITY
 #include "contact/face"
 #endif
 
 #if PRESS
-// Sums of a slave or a beam, and where the stress starts among them; numbers of a slot: normal force, N, or less what is sure
-// to be left of the gap, mm; with friction then the elastic tangential displacement, mm (3).
+// Sums of a point or a beam, and where the stress starts among them.
 const SUM_ENERGY: u32 = 0u;
 const SUM_DAMPING: u32 = 1u;
 const SUM_RADIUS: u32 = 2u;
@@ -29,35 +22,14 @@ const SUM_RADIUS: u32 = 2u;
 const SUM_FRICTION: u32 = 3u;
 const SUM_SLIP: u32 = 4u;
 const SUM_VIRIAL: u32 = 5u;
-const SLOT_STATE: u32 = 4u;
 #else
 const SUM_VIRIAL: u32 = 3u;
-const SLOT_STATE: u32 = 1u;
 #endif
 #if PERIODIC
 const SUMS: u32 = SUM_VIRIAL + 9u;
 #else
 const SUMS: u32 = SUM_VIRIAL;
 #endif
-
-// What presses two bodies apart.
-struct Press {
-    elastic_force: f32,
-    pressing: f32,
-    row_sum: f32,
-}
-
-// Penalty force of a pair at `depth` (mm) with `approach` (mm/s, negative when closing) and the inverse of its joint mass
-// `inverse_mass` (1/tonne).
-fn press(stiff: f32, depth: f32, inverse_mass: f32, approach: f32) -> Press {
-    let viscosity = params.damping * 2.0 * sqrt(stiff / inverse_mass);
-    let elastic_force = stiff * depth;
-    return Press(
-        elastic_force,
-        max(elastic_force - viscosity * approach, 0.0),
-        2.0 * (stiff + viscosity * (2.0 / row.dt)),
-    );
-}
 
 // Adds to a sum of an item.
 fn add_sum(item: u32, sum: u32, value: f32) {
@@ -77,257 +49,434 @@ fn add_virial(item: u32, push: vec3<f32>, apart: vec3<f32>) {
 #endif
 
 #if ROOT
-@group(1) @binding(0) var<storage, read> slaves: array<u32>;
-@group(1) @binding(1) var<storage, read> values: array<f32>;
-@group(1) @binding(2) var<storage, read> bodies: array<u32>;
-@group(1) @binding(3) var<storage, read> ring_lines: array<u32>;
+@group(1) @binding(0) var<storage, read> nodes: array<u32>;
+@group(1) @binding(1) var<storage, read> points: array<f32>;
+@group(1) @binding(2) var<storage, read> faces: array<u32>;
+@group(1) @binding(3) var<storage, read> near: array<u32>;
 @group(1) @binding(4) var<storage, read> reference: array<i32>;
 @group(1) @binding(5) var<storage, read> quanta: array<i32>;
 @group(1) @binding(6) var<storage, read> remainder: array<f32>;
 @group(1) @binding(7) var<storage, read> velocity: array<f32>;
 @group(1) @binding(8) var<storage, read> mass: array<f32>;
-@group(1) @binding(9) var<storage, read_write> keys: array<u32>;
-@group(1) @binding(10) var<storage, read_write> states: array<f32>;
-@group(1) @binding(11) var<storage, read_write> sums: array<f32>;
-@group(1) @binding(12) var<storage, read_write> forces: array<atomic<i32>>;
-@group(1) @binding(13) var<storage, read_write> stiffness: array<atomic<i32>>;
-@group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
+@group(1) @binding(9) var<storage, read_write> gaps: array<f32>;
+@group(1) @binding(10) var<storage, read_write> keys: array<u32>;
+@group(1) @binding(11) var<storage, read_write> touches: array<f32>;
+@group(1) @binding(12) var<storage, read_write> sums: array<f32>;
+@group(1) @binding(13) var<storage, read_write> forces: array<atomic<i32>>;
+@group(1) @binding(14) var<storage, read_write> stiffness: array<atomic<i32>>;
+@group(1) @binding(15) var<storage, read_write> status: array<atomic<u32>>;
 
-// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: what is first seen
-// deeper inside an open yarn came in through its end, and no side pushes it out; nor does one that is found late, see the twin.
-const ENTRY: f32 = 1e-3;
-// Bound on approach from which on the scene is looked at before it moves, mm/s.
-const AT_REST: f32 = 1e20;
-// Force that stands for a touch without pressure, N.
-const TOUCH: f32 = 1e-30;
-// And the one that stands for a thread inside an open yarn, N.
-const INSIDE: f32 = 4e-30;
-
-// Whether slaves are nodes of threads.
-#if THREAD
-const IS_THREAD: bool = true;
+// Numbers before the gaps of a point.
+const LEAST: u32 = 0u;
+const CLOSED: u32 = 1u;
+const INNER: u32 = 2u;
+const GAPS: u32 = 3u;
+// More than rounding moves a gap, mm.
+const GAP_ROUNDING: f32 = 1e-6;
+// Numbers of a touch.
+const NORMAL: u32 = 0u;
+const DAMPED: u32 = 1u;
+const ELASTIC: u32 = 2u;
+#if FRICTION
+const TOUCH: u32 = ELASTIC + 3u;
 #else
-const IS_THREAD: bool = false;
+const TOUCH: u32 = ELASTIC;
+#endif
+// Place of the kind in the status.
+#if THREAD
+const KIND: u32 = 0u;
+#else
+const KIND: u32 = 1u;
 #endif
 
-// A slave, and the faces of one body that push it: their normal forces, and what friction needs of the first one.
-struct Touch {
+// A point that may touch something.
+struct Point {
     item: u32,
-    slave: u32,
+    base: u32,
+    aside: Offset,
     stiff: f32,
     full_radius: f32,
     radius: f32,
-    open: bool,
-    enters: bool,
-    came_in: bool,
-    before: f32,
-    elapsed: f32,
+    size: f32,
+}
+
+// A face, its closest point, and what acts on its corners, N.
+struct Pressed {
+    found: bool,
+    nodes: vec4<u32>,
+    reference: array<vec3<f32>, 4>,
+    point: Closest,
+    pull: array<vec3<f32>, 4>,
+}
+
+// What a body does to a point: where its surface is nearest; resultant, energy and number of the features that push.
+struct Pushed {
+    nearest: Pressed,
     push: vec3<f32>,
-    normal_force: f32,
     energy: f32,
-    touched: bool,
-#if FRICTION
-    motion: vec3<f32>,
-    apart: vec3<f32>,
-    masters: Weighted,
-#endif
+    pressing: f32,
+    features: f32,
 }
 
-// One node with weight 1.
-fn single(node: u32) -> Weighted {
-    return Weighted(1u, vec4<u32>(node, 0u, 0u, 0u), vec4<f32>(1.0, 0.0, 0.0, 0.0));
+// What acts on a point, in quanta.
+var<private> own: vec3<i32>;
+
+// Whether a place is nearer than what is known.
+fn is_nearer(pushed: ptr<function, Pushed>, point: Closest) -> bool {
+    let known = (*pushed).nearest.point;
+    let tie = known.distance * 1e-4 + 1e-7;
+    let apart = point.distance - known.distance;
+    return !(*pushed).nearest.found || apart < -tie || apart <= tie && abs(point.height) > abs(known.height);
 }
 
-// Adds the normal force of a face.
-fn touch(all: ptr<function, Touch>, corners: Corners, point: Closest) {
-    let slave = (*all).slave;
-    let side = normal_and_distance(point, IS_THREAD);
-    if !side.faces {
-        return;
-    }
-    let depth = (*all).radius - side.distance;
-    if depth <= 0.0 || -side.distance >= params.depth {
-        return;
-    }
-    let weights = weights(point);
-    var motion = velocity_at(slave);
-    var apart = vec3<f32>(0.0);
-    var inverse_mass = 1.0 / mass[slave];
+// Whether the point is behind the nearest place that is known, no deeper than what is pushed out.
+fn is_behind(pushed: ptr<function, Pushed>) -> bool {
+    let point = (*pushed).nearest.point;
+    return (*pushed).nearest.found && point.height < 0.0 && point.distance < params.depth;
+}
+
+// Distance from which on a face cannot change what is nearest, mm.
+fn beyond(pushed: ptr<function, Pushed>) -> f32 {
+    return (*pushed).nearest.point.distance * (1.0 - 2e-4) - 2e-7;
+}
+
+// Adds an elastic force of a feature and its energy on the point; notes its opposite on the corners of its face.
+fn add_push(
+    pushed: ptr<function, Pushed>,
+    pulls: ptr<function, array<vec3<f32>, 4>>,
+    weights: vec4<f32>,
+    away: vec3<f32>,
+    push: f32,
+    energy: f32,
+) {
+    (*pushed).push = away * push + (*pushed).push;
+    (*pushed).energy = (*pushed).energy + energy;
+    (*pushed).pressing = (*pushed).pressing + push;
     for (var a = 0u; a < 4u; a++) {
-        motion = velocity_at(corners.nodes[a]) * -weights[a] + motion;
-        inverse_mass = inverse_mass + weights[a] * weights[a] / mass[corners.nodes[a]];
+        (*pulls)[a] = away * -(push * weights[a]) + (*pulls)[a];
     }
-    apart = corners.reference[0] * -weights[0] + apart;
-    apart = corners.reference[1] * -weights[1] + apart;
-    apart = corners.reference[2] * -weights[2] + apart;
-    apart = corners.reference[3] * -weights[3] + apart;
+}
+
+// Adds an edge or a corner within the radius, with its sign in the sum.
+fn add_border(
+    pushed: ptr<function, Pushed>,
+    pulls: ptr<function, array<vec3<f32>, 4>>,
+    here: Point,
+    border: OnEdge,
+    side: f32,
+) {
+    if border.square < here.radius * here.radius {
+        let distance = sqrt(border.square);
+        let depth = here.radius - distance;
+        let push = side * (here.stiff * depth);
+        let away = border.offset * (1.0 / max(distance, 1e-12));
+        add_push(pushed, pulls, border.weights, away, push, 0.5 * push * depth);
+        (*pushed).features = (*pushed).features + max(side, 0.0);
+    }
+}
+
+// Adds forces to the corners of a face, and their opposite to what acts on the point, as integers whose sum is zero.
+fn pull(item: u32, face: Pressed) {
+    var pulls = face.pull;
+    var places = face.reference;
+    let plane = arrayLength(&forces) / 3u;
+    let sum = ((pulls[0] + pulls[1]) + (pulls[2] + pulls[3])) / params.force_quantum;
+    let fits = is_finite(sum.x) && is_finite(sum.y) && is_finite(sum.z);
+    if !fits || any(abs(sum) >= vec3<f32>(134217728.0)) {
+        atomicOr(&status[FLAGS], FORCE_RANGE);
+        atomicStore(&status[CULPRIT], face.nodes[0]);
+        return;
+    }
+    var rest = vec3<i32>(to_i32(sum.x), to_i32(sum.y), to_i32(sum.z));
+    own = own - rest;
+    for (var a = 0u; a < 4u; a++) {
+        var part = rest;
+        if a != 3u {
+            let quanta_of = pulls[a] / params.force_quantum;
+            part = vec3<i32>(to_i32(quanta_of.x), to_i32(quanta_of.y), to_i32(quanta_of.z));
+        }
+        rest = rest - part;
+        for (var k = 0u; k < 3u; k++) {
+            atomicAdd(&forces[face.nodes[a] + k * plane], part[k]);
+        }
+#if PERIODIC
+        add_virial(item, pulls[a], places[a]);
+#endif
+    }
+}
+
+// Adds what a face does to a point, with the edges and corners that it owns; returns the gap, or as much as is sure to be left.
+fn face_push(here: Point, entry: u32, most: f32, pushed: ptr<function, Pushed>) -> f32 {
+    let seen = of_key(entry);
+    let around = corners(seen.body, seen.image, here.base, here.aside);
+    let q = around.current;
+    let shape = patch_of(q);
+    let sure = nearest(shape) - here.radius;
+    if sure > most {
+        return sure;
+    }
+    let point = closest(q, shape);
+    let gap = point.distance - here.radius;
+    let pushes = gap < 0.0;
+    var pulls = array<vec3<f32>, 4>();
+    if pushes {
+        let bits = marks(seen.body);
+        let push = here.stiff * -gap;
+        add_push(pushed, &pulls, point.weights, point.away, push, -0.5 * push * gap);
+        (*pushed).features = (*pushed).features + 1.0;
+        for (var a = 0u; a < 4u; a++) {
+            if (bits >> a & 1u) == 1u {
+                add_border(pushed, &pulls, here, on_edge(q, a), -1.0);
+            }
+            if (bits >> (4u + a) & 1u) == 1u {
+                add_border(pushed, &pulls, here, on_corner(q, a), 1.0);
+            }
+        }
+    }
+    let face = Pressed(true, around.nodes, around.reference, point, pulls);
+    if is_nearer(pushed, point) {
+        let known = (*pushed).nearest;
+        (*pushed).nearest = face;
+        if known.found && known.point.distance < here.radius {
+            pull(here.item, known);
+        }
+    } else if pushes {
+        pull(here.item, face);
+    }
+    return gap;
+}
+
+// What a body does to a point, by its entries and their gaps: those that are no larger than `most` are looked at. Returns the least.
+fn look(here: Point, list: u32, first_gap: u32, part: vec2<u32>, most: f32, pushed: ptr<function, Pushed>) -> f32 {
+    for (var i = part.x; i < part.y; i++) {
+        if gaps[first_gap + i] <= most {
+            gaps[first_gap + i] = face_push(here, near[list + i], most, pushed);
+        }
+    }
+    // it is inside only if no other face is nearer
+    let looks = is_behind(pushed);
+    var least = params.skin;
+    for (var i = part.x; i < part.y; i++) {
+        let far = beyond(pushed) - here.radius;
+        if looks && gaps[first_gap + i] < far {
+            gaps[first_gap + i] = face_push(here, near[list + i], far, pushed);
+        }
+        least = min(least, gaps[first_gap + i]);
+    }
+    return least;
+}
+
+// Pushes a point out of a body that it is inside of; returns how deep it is, mm.
+fn push_out(here: Point, pushed: ptr<function, Pushed>) -> f32 {
+    if !is_behind(pushed) {
+        return 0.0;
+    }
+    let point = (*pushed).nearest.point;
+    var pulls = (*pushed).nearest.pull;
+    let depth = point.distance;
+    let whole = here.radius + depth;
+    let outside = max(here.radius - depth, 0.0);
+    let energy = 0.5 * here.stiff * (whole * whole - outside * outside);
+    add_push(pushed, &pulls, point.weights, point.away * -1.0, here.stiff * (whole + outside), energy);
+    (*pushed).features = (*pushed).features + 1.0;
+    (*pushed).nearest.pull = pulls;
+    return depth;
+}
+
+// Viscosity that damps a spring between masses of joint inverse `inverse_mass`.
+fn viscosity(stiff: f32, inverse_mass: f32) -> f32 {
+    return params.damping * 2.0 * sqrt(stiff / inverse_mass);
+}
+
+// What damping and friction take, once for a point and a body, where the surface is nearest: a touch goes on.
+fn rub(here: Point, pushed: ptr<function, Pushed>, touch: u32) {
+    let face = (*pushed).nearest;
+    var places = face.reference;
+    let weights = face.point.weights;
+    let elapsed = row.dt_mid + row.dt_mid - row.dt;
+    var motion = vec3<f32>(0.0);
+    var apart = vec3<f32>(0.0);
+    var inverse_mass = 0.0;
+    for (var a = 0u; a < CARRIED_BY; a++) {
+        let node = carried_by(here.item, a);
+        let weight = points[POINT * here.item + a];
+        motion = velocity_at(node) * weight + motion;
+        inverse_mass = inverse_mass + weight * weight / mass[node];
+    }
+    for (var a = 0u; a < 4u; a++) {
+        motion = velocity_at(face.nodes[a]) * -weights[a] + motion;
+        apart = places[a] * -weights[a] + apart;
+        inverse_mass = inverse_mass + weights[a] * weights[a] / mass[face.nodes[a]];
+    }
 #if PERIODIC
     motion = motion + apply(rate(), apart);
 #endif
-    let approach = dot(motion, side.normal);
-    let entry = ENTRY - 2.0 * min(approach, 0.0) * (*all).elapsed;
-    let late = IS_THREAD && (*all).open && depth > 0.5 * (*all).radius;
-    if ((*all).enters || late) && depth > (*all).before + entry {
-        (*all).came_in = (*all).came_in || (*all).enters;
-        return;
+    let size = norm((*pushed).push);
+    var normal = face.point.away;
+    if size > 0.0 {
+        normal = (*pushed).push * (1.0 / size);
     }
-    let pressed = press((*all).stiff, depth, inverse_mass, approach);
-    let item = (*all).item;
-    add_sum(item, SUM_DAMPING, (pressed.elastic_force - pressed.pressing) * approach * (*all).elapsed);
-    add_sum(item, SUM_RADIUS, pressed.elastic_force * (*all).full_radius * row.radius_increment);
-    (*all).energy = (*all).energy + 0.5 * pressed.elastic_force * depth;
-    let push = side.normal * pressed.pressing;
-    (*all).push = (*all).push + push;
-    (*all).normal_force = (*all).normal_force + pressed.pressing;
-#if PERIODIC
-    add_virial(item, push, apart);
-#endif
-    let masters = Weighted(4u, corners.nodes, weights);
-    add_pair(push, single(slave), masters);
-    add_stiffness(pressed.row_sum, masters);
-    add_stiffness(pressed.row_sum, single(slave));
-    raise(PENETRATION + select(1u, 0u, IS_THREAD), depth);
+    let approach = dot(motion, normal);
+    let viscous = viscosity(here.stiff, inverse_mass);
+    let pressing = max(size - viscous * approach, 0.0);
+    // over the way since the positions before, with the mean of the forces before and now
+    let damped = size - pressing;
+    add_sum(here.item, SUM_DAMPING, 0.5 * (touches[touch + DAMPED] + damped) * approach * elapsed);
+    touches[touch + NORMAL] = pressing;
+    touches[touch + DAMPED] = damped;
+    var push = normal * -damped;
 #if FRICTION
-    if !(*all).touched {
-        (*all).motion = motion;
-        (*all).apart = apart;
-        (*all).masters = masters;
-    }
+    let tangential = here.stiff * params.tangential;
+    let limit = params.friction * pressing;
+    let elastic = vec3<f32>(touches[touch + ELASTIC], touches[touch + ELASTIC + 1u], touches[touch + ELASTIC + 2u]);
+    let slid = slide(elastic, motion * elapsed, normal, tangential, limit);
+    add_sum(here.item, SUM_FRICTION, slid.dissipated);
+    add_sum(here.item, SUM_SLIP, slid.slip);
+    touches[touch + ELASTIC] = slid.elastic.x;
+    touches[touch + ELASTIC + 1u] = slid.elastic.y;
+    touches[touch + ELASTIC + 2u] = slid.elastic.z;
+    (*pushed).energy = (*pushed).energy + 0.5 * tangential * dot(slid.elastic, slid.elastic);
+    push = slid.elastic * -tangential + push;
 #endif
-    (*all).touched = true;
+    var pulls = face.pull;
+    for (var a = 0u; a < 4u; a++) {
+        pulls[a] = push * -weights[a] + pulls[a];
+    }
+    (*pushed).nearest.pull = pulls;
+    let rows = (1.0 + here.size) * (here.stiff * (*pushed).features + viscous * (2.0 / row.dt));
+    let stiffness_quanta = rows / params.stiffness_quantum;
+    for (var a = 0u; a < 4u; a++) {
+        atomicAdd(&stiffness[face.nodes[a]], to_i32(stiffness_quanta * abs(weights[a])));
+    }
+    for (var a = 0u; a < CARRIED_BY; a++) {
+        let node = carried_by(here.item, a);
+        atomicAdd(&stiffness[node], to_i32(stiffness_quanta * abs(points[POINT * here.item + a])));
+    }
+}
+
+// Adds what acts on a point to its nodes.
+fn share_out(here: Point) {
+    let plane = arrayLength(&forces) / 3u;
+    var rest = own;
+    for (var a = 0u; a < CARRIED_BY; a++) {
+        var part = rest;
+        if a + 1u != CARRIED_BY {
+            let share = vec3<f32>(own) * points[POINT * here.item + a];
+            part = vec3<i32>(to_i32(share.x), to_i32(share.y), to_i32(share.z));
+        }
+        rest = rest - part;
+        let node = carried_by(here.item, a);
+        for (var k = 0u; k < 3u; k++) {
+            atomicAdd(&forces[node + k * plane], part[k]);
+        }
+    }
+}
+
+// The place of a body among the touches of a point; if it `begins` to touch, a free one; else `params.slots`.
+fn place_of(item: u32, body: u32, begins: bool) -> u32 {
+    var free = params.slots;
+    for (var slot = 0u; slot < params.slots; slot++) {
+        let known = keys[(MADE + params.slots) * item + MADE + slot];
+        if known == body {
+            return slot;
+        }
+        if begins && known == EMPTY && free == params.slots {
+            free = slot;
+        }
+    }
+    return free;
+}
+
+// What a body has done to a point: damping, friction, and what is left of the touch. Returns how deep the point is inside.
+fn settle(here: Point, body: u32, pushed: ptr<function, Pushed>, touching: ptr<function, bool>) -> f32 {
+    let depth = push_out(here, pushed);
+    let begins = (*pushed).features > 0.0;
+    let slot = place_of(here.item, body, begins);
+    if slot == params.slots {
+        return depth;
+    }
+    let touch = TOUCH * (params.slots * here.item + slot);
+    let place = (MADE + params.slots) * here.item + MADE + slot;
+    rub(here, pushed, touch);
+    pull(here.item, (*pushed).nearest);
+    add_sum(here.item, SUM_RADIUS, (*pushed).pressing * here.full_radius * row.radius_increment);
+    add_sum(here.item, SUM_ENERGY, (*pushed).energy);
+    if begins {
+        *touching = true;
+        keys[place] = body;
+        let outside = max(here.radius - (*pushed).nearest.point.distance, 0.0);
+        raise(PENETRATION + KIND, select(outside, here.radius + depth, depth > 0.0));
+    } else {
+        keys[place] = EMPTY;
+        for (var i = 0u; i < TOUCH; i++) {
+            touches[touch + i] = 0.0;
+        }
+    }
+    return depth;
 }
 
 fn penalty(item: u32) {
-    let first_key = SLOT_KEYS * params.slots * item;
-    if keys[first_key] == EMPTY {
+    let first = (MADE + params.faces) * nodes[CARRIED * item + CARRIED - 1u];
+    let full_radius = points[POINT * item + 5u];
+    var size = 0.0;
+    for (var a = 0u; a < CARRIED_BY; a++) {
+        size = size + abs(points[POINT * item + a]);
+    }
+    let elapsed = row.dt_mid + row.dt_mid - row.dt;
+    let closing = row.approach * (0.5 * (1.0 + size)) * elapsed + full_radius * row.radius_increment;
+    let first_gap = (GAPS + params.faces) * item;
+    let made = (MADE + params.slots) * item;
+    if keys[made] != near[first] {
+        // a new list: all faces are looked at, wherever the point may be
+        keys[made] = near[first];
+        for (var i = 0u; i < GAPS + params.faces; i++) {
+            gaps[first_gap + i] = 0.0;
+        }
+        gaps[first_gap + INNER] = params.depth;
+    }
+    let closed = gaps[first_gap + CLOSED] + closing;
+    if closed < gaps[first_gap + LEAST] {
+        gaps[first_gap + CLOSED] = closed;
         return;
     }
-    var all: Touch;
-    all.item = item;
-    all.slave = slaves[SLAVE * item];
-    all.stiff = values[SLAVE_VALUES * item];
-    all.full_radius = values[SLAVE_VALUES * item + 1u];
-    all.radius = all.full_radius * row.radius;
-    all.elapsed = row.dt_mid + row.dt_mid - row.dt;
-    let slave = all.slave;
-#if FRICTION
-    let tangential = all.stiff * params.tangential;
-#endif
-    let closing = row.approach * all.elapsed + all.full_radius * row.radius_increment;
-    var touches = false;
-    for (var slot = 0u; slot < params.slots; slot++) {
-        let k = first_key + SLOT_KEYS * slot;
-        if keys[k] == EMPTY {
-            break;
+    let stiff = points[POINT * item + 4u];
+    let radius = full_radius * row.radius;
+    let here = Point(item, carried_by(item, 0u), point_of(item), stiff, full_radius, radius, size);
+    // a point that was inside is no deeper than this now
+    let most = gaps[first_gap + INNER] + closing + GAP_ROUNDING;
+    var least = params.skin;
+    var inner = 0.0;
+    var touching = false;
+    own = vec3<i32>(0);
+    sums[SUMS * item + SUM_ENERGY] = 0.0;
+    let list = first + MADE;
+    var end = 0u;
+    while end < params.faces && near[list + end] != EMPTY {
+        let start = end;
+        let body = body_of(near[list + end]);
+        var gap = params.skin;
+        while end < params.faces && near[list + end] != EMPTY && body_of(near[list + end]) == body {
+            let left = gaps[first_gap + GAPS + end] - closed;
+            gaps[first_gap + GAPS + end] = left;
+            gap = min(gap, left);
+            end++;
         }
-        let candidate = of_key(keys[k]);
-        let s = SLOT_STATE * (params.slots * item + slot);
-        if states[s] < 0.0 {
-            let gap = states[s] + closing;
-            states[s] = gap;
-            if gap < 0.0 {
-                continue;
-            }
-#if THREAD
-#else
-            // until now it was in front
-            states[s] = 0.0;
-#endif
-        }
-        let from_place = Place(i32(keys[k + 1u]), i32(keys[k + 2u]));
-        var open = true;
-#if PERIODIC
-        open = !is_closed(candidate.body);
-#endif
-        var found = walk(slave, candidate.body, candidate.image, from_place);
-#if THREAD
-        if open && is_rim(candidate.body, found.place, found.point) {
-            found = around(slave, candidate.body, candidate.image, found);
-        }
-        if found.point.distance >= all.radius && !is_behind(found.point) {
-            found = beside(slave, candidate.body, candidate.image, found);
-        }
-#endif
-        let point = found.point;
-        keys[k + 1u] = u32(found.place.ring);
-        keys[k + 2u] = u32(found.place.slice);
-        let moves = row.approach < AT_REST;
-#if THREAD
-        var inside = false;
-        if open && moves {
-            let was = states[s] == INSIDE;
-            let comes = point.interior && (states[s] <= 0.0 || is_end(candidate.body, found.place));
-            let stays = was && !is_rim(candidate.body, found.place, point);
-            inside = height(point) < 0.0 && (comes || stays);
-            if was && !inside {
-                states[s] = 0.0;
-            }
-        }
-#endif
-        all.open = open && moves;
-        all.enters = all.open && states[s] <= 0.0;
-        all.before = max(states[s], 0.0) / all.stiff;
-        all.push = vec3<f32>(0.0);
-        all.normal_force = 0.0;
-        all.touched = false;
-        all.came_in = false;
-#if THREAD
-        if !inside {
-            touch(&all, found.corners, point);
-            if point.distance < all.radius {
-                faces_within(&all, slave, candidate.body, candidate.image, found, all.radius);
-            }
-        }
-#else
-        // what is behind the border of a cut end is before the end, and not in the yarn
-        if !(height(point) < 0.0 && is_rim(candidate.body, found.place, point)) {
-            touch(&all, found.corners, point);
-        }
-#endif
-        let size = norm(all.push);
-#if FRICTION
-        let elastic = vec3<f32>(states[s + 1u], states[s + 2u], states[s + 3u]);
-#endif
-        if !(all.touched && size > 0.0) {
-#if FRICTION
-            add_sum(item, SUM_FRICTION, 0.5 * tangential * dot(elastic, elastic));
-            states[s + 1u] = 0.0;
-            states[s + 2u] = 0.0;
-            states[s + 3u] = 0.0;
-#endif
-#if THREAD
-            if inside {
-                add_sum(item, SUM_DAMPING, 0.5 * all.stiff * all.before * all.before);
-                states[s] = INSIDE;
-                continue;
-            }
-#endif
-            // a point behind a face keeps being looked at
-            let gap = select(0.0, point.distance - all.radius, IS_THREAD || height(point) > 0.0);
-            states[s] = select(-max(gap, 0.0), TOUCH, open && all.touched);
+        if gap > most {
+            least = min(least, gap);
             continue;
         }
-        touches = true;
-        states[s] = select(all.normal_force, 0.0, all.came_in);
-#if FRICTION
-        let limit = params.friction * all.normal_force;
-        let slid = slide(elastic, all.motion * all.elapsed, all.push * (1.0 / size), tangential, limit);
-        add_sum(item, SUM_FRICTION, slid.dissipated);
-        add_sum(item, SUM_SLIP, slid.slip);
-        states[s + 1u] = slid.elastic.x;
-        states[s + 2u] = slid.elastic.y;
-        states[s + 3u] = slid.elastic.z;
-        all.energy = all.energy + 0.5 * tangential * dot(slid.elastic, slid.elastic);
-        let drag = slid.elastic * -tangential;
-#if PERIODIC
-        add_virial(item, drag, all.apart);
-#endif
-        add_pair(drag, single(slave), all.masters);
-#endif
+        var pushed = Pushed();
+        least = min(least, look(here, list, first_gap + GAPS, vec2<u32>(start, end), most, &pushed));
+        inner = max(inner, settle(here, body, &pushed, &touching));
     }
-    sums[SUMS * item + SUM_ENERGY] = all.energy;
-    if touches {
-        atomicAdd(&status[TOUCHING + select(1u, 0u, IS_THREAD)], 1u);
+    gaps[first_gap + LEAST] = least - inner - GAP_ROUNDING;
+    gaps[first_gap + CLOSED] = 0.0;
+    gaps[first_gap + INNER] = inner;
+    if any(own != vec3<i32>(0)) {
+        share_out(here);
+    }
+    if touching {
+        atomicAdd(&status[TOUCHING + KIND], 1u);
     }
 }
 #endif

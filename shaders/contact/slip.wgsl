@@ -1,4 +1,4 @@
-// How far slaves have slipped since the start.
+// How far contact points have slipped since the start.
 
 #if PERIODIC
 const SUMS: u32 = 14u;

@@ -1,4 +1,5 @@
-// Contact of beams with beams: closest points of two segments, the beams' lines, penalty and friction as for faces.
+// Contact of beams with beams: which are near, and every step the forces of those that touch, from the line of one thread integrated
+// over that of the other, with damping and friction at the point where these act.
 
 #define STATUS
 #if pairs
@@ -12,40 +13,7 @@
 #include "contact/grid"
 #include "contact/penalty"
 #include "contact/bow"
-
-// Numbers of a beam's place on its thread: arc length of its middle, mm; its length, mm; length of a closed thread, mm, else 0.
-const ARC: u32 = 3u;
-
-// Coordinates (0 to 1) of the closest points of segment `0 → d1` and segment `start → start + d2`.
-fn closest_points(d1: vec3<f32>, d2: vec3<f32>, start: vec3<f32>) -> vec2<f32> {
-    let a = dot(d1, d1);
-    let e = dot(d2, d2);
-    let b = dot(d1, d2);
-    let c = -dot(d1, start);
-    let f = -dot(d2, start);
-    let determinant = a * e - b * b;
-    var s: f32;
-    if determinant > a * e * 1e-6 {
-        s = unit((b * f - c * e) / determinant);
-    } else {
-        // parallel: the middle of the overlap
-        let p = dot(d1, start) / a;
-        let q = dot(d1, start + d2) / a;
-        s = unit(0.5 * (max(min(p, q), 0.0) + min(max(p, q), 1.0)));
-    }
-    let t = (b * s + f) / e;
-    if t < 0.0 {
-        return vec2<f32>(unit(-c / a), 0.0);
-    }
-    if t > 1.0 {
-        return vec2<f32>(unit((b - c) / a), 1.0);
-    }
-    return vec2<f32>(s, t);
-}
-
-fn unit(x: f32) -> f32 {
-    return min(max(x, 0.0), 1.0);
-}
+#include "contact/segments"
 
 #if ROOT
 @group(1) @binding(0) var<storage, read> ends: array<u32>;
@@ -56,163 +24,182 @@ fn unit(x: f32) -> f32 {
 @group(1) @binding(5) var<storage, read> neighbours: array<u32>;
 @group(1) @binding(6) var<storage, read> shares: array<f32>;
 
-// From the line of beam `a`, which lies `aside` of its chord, to that of `b` in an image, in the reference and now.
-fn between(a: u32, aside: Bow, b: u32, image: vec2<i32>) -> FromSlave {
-#if PERIODIC
-    let chords = from_slave(ends[2u * a], Imaged(ends[2u * b], image * params.period));
-#else
-    let chords = from_slave(ends[2u * a], Imaged(ends[2u * b], image));
-#endif
-    let other = bow(b);
-    return FromSlave(chords.reference + (other.reference - aside.reference), chords.current + (other.current - aside.current));
+// Two pieces in the reference and now.
+struct Pieces {
+    rest: Segments,
+    now: Segments,
+}
+
+fn segments_of(own: array<vec3<f32>, 2>, apart: vec3<f32>, other: array<vec3<f32>, 2>) -> Segments {
+    return Segments(own[1] - own[0], apart + (other[0] - own[0]), other[1] - other[0]);
+}
+
+// The pieces of beam `a`, which is known, and of `b` in an image.
+fn pieces(a: u32, own: Piece, b: u32, image: vec2<i32>) -> Pieces {
+    let apart = from_node(Imaged(ends[2u * b], image), ends[2u * a]);
+    let other = piece(b);
+    return Pieces(segments_of(own.rest, apart.reference, other.rest), segments_of(own.now, apart.current, other.now));
 }
 
 #if pairs
-@group(1) @binding(7) var<storage, read> threads: array<u32>;
-@group(1) @binding(8) var<storage, read> arcs: array<f32>;
-@group(1) @binding(9) var<storage, read> counts: array<u32>;
-@group(1) @binding(10) var<storage, read> lists: array<u32>;
-@group(1) @binding(11) var<storage, read> boxes: array<f32>;
-@group(1) @binding(12) var<storage, read_write> keys: array<u32>;
-@group(1) @binding(13) var<storage, read_write> states: array<f32>;
-@group(1) @binding(14) var<storage, read_write> found_when: array<u32>;
-@group(1) @binding(15) var<storage, read_write> status: array<atomic<u32>>;
+@group(1) @binding(7) var<storage, read> counts: array<u32>;
+@group(1) @binding(8) var<storage, read> lists: array<u32>;
+@group(1) @binding(9) var<storage, read> boxes: array<f32>;
+@group(1) @binding(10) var<storage, read_write> keys: array<u32>;
+@group(1) @binding(11) var<storage, read_write> states: array<f32>;
+@group(1) @binding(12) var<storage, read_write> found_when: array<u32>;
+@group(1) @binding(13) var<storage, read_write> status: array<atomic<u32>>;
 
-// Pairs that a beam can have.
-const MOST_PAIRS: u32 = 64u;
+// Cells from the first to the last along x and y.
+struct Cells {
+    x: vec2<i32>,
+    y: vec2<i32>,
+}
 
-// Whether two beams are neighbours on one thread.
-fn are_neighbours(a: u32, b: u32) -> bool {
-    if threads[a] != threads[b] {
-        return false;
+// The cells of a beam's piece, whose first node is at `node`.
+fn cells_of(node: vec2<f32>, line: Piece, back: Inverse) -> Cells {
+    let a = node + pull_back(back, line.now[0]);
+    let b = node + pull_back(back, line.now[1]);
+    // lines leave the boxes of their items by so much
+    let room = params.beside * stretch(back);
+    let low = min(a, b) - room;
+    let high = max(a, b) + room;
+    return Cells(cells(0u, low.x, high.x), cells(1u, low.y, high.y));
+}
+
+// Whether a cell is full, and whether a beam of a higher number has moved relative to this one since everything was searched.
+struct Moved {
+    full: bool,
+    moved: bool,
+}
+
+fn moved_in(item: u32, at: Cells) -> Moved {
+    let own = motion_of(item);
+    var found = Moved(false, false);
+    for (var y = at.y.x; y <= at.y.y; y++) {
+        for (var x = at.x.x; x <= at.x.y; x++) {
+            let cell = cell_index(x, y);
+            found.full = found.full || counts[cell] > params.capacity;
+            for (var i = 0u; i < counts[cell] && !(found.moved || found.full); i++) {
+                let near = lists[cell * params.capacity + i];
+                found.moved = near > item && has_moved(near, own, f32(params.apart));
+            }
+        }
     }
-    let direct = abs(arcs[ARC * a] - arcs[ARC * b]);
-    let thread = arcs[ARC * a + 2u];
-    let around = select(direct, min(direct, thread - direct), thread > 0.0);
-    return around - 0.5 * (arcs[ARC * a + 1u] + arcs[ARC * b + 1u]) < params.self_arc;
+    return found;
+}
+
+// The image of an item that is nearest to another one.
+fn image_of(item: u32, near: u32) -> vec2<i32> {
+    var image = vec2<i32>(0);
+#if PERIODIC
+    let period = vec2<f32>(params.period) * QUANTUM;
+    let apart = vec2<f32>(boxes[BOX * item] - boxes[BOX * near], boxes[BOX * item + 1u] - boxes[BOX * near + 1u]);
+    if params.period.x != 0 {
+        image.x = to_i32(apart.x / period.x);
+    }
+    if params.period.y != 0 {
+        image.y = to_i32(apart.y / period.y);
+    }
+#endif
+    return image;
+}
+
+// Whether a pair is within reach.
+fn is_near(beam: u32, line: Piece, other: u32, image: vec2<i32>) -> bool {
+    return distance_of(pieces(beam, line, other, image).now) < 2.0 * params.thread_radius + params.skin;
+}
+
+// Moves a slot, of all that there are, to another one.
+fn move_slot(slot: u32, to: u32) {
+    keys[to] = keys[slot];
+    for (var i = 0u; i < params.state; i++) {
+        states[params.state * to + i] = states[params.state * slot + i];
+    }
+}
+
+// Takes pairs that are out of reach off a beam's list; how many are left.
+fn keep(beam: u32, line: Piece) -> u32 {
+    let slots = params.beam_slots;
+    let first = slots * beam;
+    var count = 0u;
+    for (var slot = first; slot < first + slots; slot++) {
+        let known = keys[slot];
+        if known == EMPTY {
+            break;
+        }
+        let candidate = of_key(known);
+        if is_near(beam, line, candidate.body, candidate.image) {
+            move_slot(slot, first + count);
+            count++;
+        }
+    }
+    for (var slot = first + count; slot < first + slots; slot++) {
+        keys[slot] = EMPTY;
+    }
+    return count;
+}
+
+// Adds a pair to a beam's list of `count` in ascending order, if it is not there and within reach; how many it then has, one more
+// than there is room for if there is none.
+fn insert(beam: u32, line: Piece, near: u32, count: u32) -> u32 {
+    let slots = params.beam_slots;
+    let first = slots * beam;
+    let other = near - params.slabs;
+    let image = image_of(params.slabs + beam, near);
+    let pair = key(other, image);
+    var place = 0u;
+    while place < count && keys[first + place] < pair {
+        place++;
+    }
+    if place < count && keys[first + place] == pair {
+        return count;
+    }
+    if are_near(beam, other, image, params.self_arc) || !is_near(beam, line, other, image) {
+        return count;
+    }
+    if count < slots {
+        for (var to = count; to > place; to--) {
+            move_slot(first + to - 1u, first + to);
+        }
+        keys[first + place] = pair;
+        for (var i = 0u; i < params.state; i++) {
+            states[params.state * (first + place) + i] = 0.0;
+        }
+    }
+    return count + 1u;
 }
 
 fn pairs(beam: u32) {
     let back = inverse();
-#if PERIODIC
-    let period = vec2<f32>(params.period) * QUANTUM;
-#endif
-    let reach = 2.0 * params.thread_radius + params.skin;
-#if PERIODIC
-    let at_box = BOX * (params.slabs + beam);
-    let middle = vec2<f32>(boxes[at_box], boxes[at_box + 1u]);
-#endif
-    let own = vector(beam);
-    let along = own.reference + own.change;
-    let aside = bow(beam);
-    let start = absolute(back, ends[2u * beam]).xy + pull_back(back, aside.current);
-    let end = start + pull_back(back, along);
-    let xs = cells(0u, min(start.x, end.x), max(start.x, end.x));
-    let ys = cells(1u, min(start.y, end.y), max(start.y, end.y));
-    if !(is_finite(start.x) && is_finite(start.y)) {
+    let line = piece(beam);
+    let node = absolute(back, ends[2u * beam]).xy;
+    if !(is_finite(node.x) && is_finite(node.y)) {
         atomicOr(&status[FLAGS], NOT_FINITE);
         return;
     }
+    let at = cells_of(node, line, back);
     let found_at = found_when[beam];
-    let own_motion = motion_of(params.slabs + beam);
-    var searches = found_at != WITH_ALL;
-    var full = false;
-    for (var y = ys.x; y <= ys.y; y++) {
-        for (var x = xs.x; x <= xs.y; x++) {
-            let cell = cell_index(x, y);
-            full = full || counts[cell] > params.capacity;
-            for (var i = 0u; i < counts[cell] && !(searches || full); i++) {
-                let near = lists[cell * params.capacity + i];
-                searches = near > params.slabs + beam && has_moved(near, own_motion, f32(params.apart));
-            }
-        }
-    }
+    let moved = moved_in(params.slabs + beam, at);
     // overflow keeps what was known, and is searched again with larger tables
-    if !searches || full {
+    if moved.full || !moved.moved && found_at == WITH_ALL {
         return;
     }
-    // in ascending order
-    var found: array<u32, MOST_PAIRS>;
-    var count = 0u;
-    for (var y = ys.x; y <= ys.y; y++) {
-        for (var x = xs.x; x <= xs.y; x++) {
+    var count = keep(beam, line);
+    for (var y = at.y.x; y <= at.y.y; y++) {
+        for (var x = at.x.x; x <= at.x.y; x++) {
             let cell = cell_index(x, y);
             let listed = counts[cell];
             for (var i = 0u; i < listed; i++) {
                 let near = lists[cell * params.capacity + i];
-                if near < params.slabs + beam + 1u {
-                    continue;
+                if near > params.slabs + beam {
+                    count = insert(beam, line, near, count);
                 }
-                let other = near - params.slabs;
-                if are_neighbours(beam, other) {
-                    continue;
-                }
-                var image = vec2<i32>(0);
-#if PERIODIC
-                if params.period.x != 0 {
-                    image.x = to_i32((middle.x - boxes[BOX * near]) / period.x);
-                }
-                if params.period.y != 0 {
-                    image.y = to_i32((middle.y - boxes[BOX * near + 1u]) / period.y);
-                }
-#endif
-                let apart = between(beam, aside, other, image).current;
-                let theirs = vector(other);
-                let direction = theirs.reference + theirs.change;
-                let st = closest_points(along, direction, apart);
-                let offset = along * st.x - (direction * st.y + apart);
-                if !(norm(offset) < reach) {
-                    continue;
-                }
-                let pair = key(other, image);
-                var place = 0u;
-                while place < count && found[place] < pair {
-                    place++;
-                }
-                if place < count && found[place] == pair {
-                    continue;
-                }
-                if count == MOST_PAIRS {
-                    full = true;
-                    continue;
-                }
-                for (var to = count; to > place; to--) {
-                    found[to] = found[to - 1u];
-                }
-                found[place] = pair;
-                count++;
-            }
-        }
-    }
-    let slots = params.beam_slots;
-    if full || count > slots {
-        atomicOr(&status[FLAGS], SLOTS_FULL);
-        return;
-    }
-    let size = params.state;
-    var old: array<u32, MOST_PAIRS>;
-    var old_state: array<vec4<f32>, MOST_PAIRS>;
-    for (var slot = 0u; slot < slots; slot++) {
-        old[slot] = keys[slots * beam + slot];
-        for (var i = 0u; i < size; i++) {
-            old_state[slot][i] = states[size * (slots * beam + slot) + i];
-        }
-    }
-    for (var slot = 0u; slot < slots; slot++) {
-        var pair = EMPTY;
-        var state = vec4<f32>(0.0);
-        if slot < count {
-            pair = found[slot];
-            for (var i = 0u; i < slots; i++) {
-                if old[i] == pair {
-                    state = old_state[i];
-                    break;
+                if count > params.beam_slots {
+                    atomicOr(&status[FLAGS], SLOTS_FULL);
+                    return;
                 }
             }
-        }
-        keys[slots * beam + slot] = pair;
-        for (var i = 0u; i < size; i++) {
-            states[size * (slots * beam + slot) + i] = state[i];
         }
     }
     found_when[beam] = select(SINCE, WITH_ALL, found_at == NEVER);
@@ -221,6 +208,12 @@ fn pairs(beam: u32) {
 #endif
 
 #if force
+// Numbers of a slot.
+#if FRICTION
+const SLOT_STATE: u32 = 4u;
+#else
+const SLOT_STATE: u32 = 1u;
+#endif
 @group(1) @binding(7) var<storage, read> velocity: array<f32>;
 @group(1) @binding(8) var<storage, read> mass: array<f32>;
 @group(1) @binding(9) var<storage, read_write> keys: array<u32>;
@@ -230,121 +223,260 @@ fn pairs(beam: u32) {
 @group(1) @binding(13) var<storage, read_write> stiffness: array<atomic<i32>>;
 @group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
 
-// Mean of the sums of the sizes of the weights of two lines.
-fn mean_weights(a: u32, b: u32) -> f32 {
-    return 0.5 * (line_weights(a) + line_weights(b));
+// Share of a beam below which the length that touches is not divided by.
+const LEAST: f32 = 1e-6;
+
+// Two beams that touch: their nodes and weights, the penalty times their lengths, N/mm, and their pieces at rest.
+struct Pair {
+    nodes: array<vec4<u32>, 2>,
+    weights: array<array<vec4<f32>, 2>, 2>,
+    strengths: vec2<f32>,
+    rest: Segments,
+}
+
+// Whether beam `a` takes the joint at the first end of `b` off: where it is a pair with the beam before `b` too.
+fn owns(a: u32, b: u32, image: vec2<i32>) -> bool {
+    let before = before_of(b, image);
+    return before.body != b && before.body > a && !are_near(a, before.body, before.image, params.self_arc);
+}
+
+// Distance at which threads touch, mm.
+fn reach_now() -> f32 {
+    return 2.0 * params.thread_radius * row.radius;
+}
+
+// Increment of that distance since the step before, mm.
+fn growth_now() -> f32 {
+    return 2.0 * params.thread_radius * row.radius_increment;
+}
+
+// Time since the step before, s.
+fn elapsed() -> f32 {
+    return row.dt_mid + row.dt_mid - row.dt;
+}
+
+// Lets gaps close, and tells whether one of a beam's pairs can touch.
+fn can_touch(beam: u32) -> bool {
+    let slots = params.beam_slots;
+    let weights = most_weights(beam);
+    var touches = false;
+    for (var slot = slots * beam; slot < slots * (beam + 1u); slot++) {
+        if keys[slot] == EMPTY {
+            break;
+        }
+        let s = SLOT_STATE * slot;
+        if states[s] < 0.0 {
+            let mean = 0.5 * (weights + most_weights(of_key(keys[slot]).body));
+            states[s] = states[s] + row.approach * mean * elapsed() + growth_now();
+        }
+        touches = touches || !(states[s] < 0.0);
+    }
+    return touches;
+}
+
+#if FRICTION
+// Tangential stiffness of a beam's pairs, N/mm: that of a contact as long as the beam, or as a thread is thick.
+fn tangential_of(beam: u32) -> f32 {
+    return params.thread_thread * min(beams[TABLE * beam + 3u], 2.0 * params.thread_radius) * params.tangential;
+}
+#endif
+
+// Lets go of what friction holds.
+fn release(beam: u32, s: u32) {
+#if FRICTION
+    let elastic = vec3<f32>(states[s + 1u], states[s + 2u], states[s + 3u]);
+    add_sum(beam, SUM_FRICTION, 0.5 * tangential_of(beam) * dot(elastic, elastic));
+    states[s + 1u] = 0.0;
+    states[s + 2u] = 0.0;
+    states[s + 3u] = 0.0;
+#endif
+}
+
+// How fast points of two pieces separate, mm/s, and the square of the frequency of lengths that touch, 1/s².
+struct Relative {
+    motion: vec3<f32>,
+    square: f32,
+}
+
+fn add_relative(to: Relative, nodes: vec4<u32>, weights: vec4<f32>, sign: f32, strength: f32) -> Relative {
+    var sum = to;
+    for (var i = 0u; i < 4u; i++) {
+        sum.motion = velocity_at(nodes[i]) * (sign * weights[i]) + sum.motion;
+        sum.square = sum.square + (strength + strength) * weights[i] * weights[i] / mass[nodes[i]];
+    }
+    return sum;
+}
+
+fn relative(pair: Pair, s: f32, t: f32) -> Relative {
+    let own = pair.weights[0][0] * (1.0 - s) + pair.weights[0][1] * s;
+    let others = pair.weights[1][0] * (1.0 - t) + pair.weights[1][1] * t;
+    var sum = add_relative(Relative(vec3<f32>(0.0), 0.0), pair.nodes[0], own, 1.0, pair.strengths.x);
+    sum = add_relative(sum, pair.nodes[1], others, -1.0, pair.strengths.y);
+#if PERIODIC
+    sum.motion = sum.motion + apply(rate(), pair.rest.along * s - (pair.rest.other * t + pair.rest.start));
+#endif
+    return sum;
+}
+
+// Adds damping and friction to an elastic force of size `pressed` (N), at the point where it acts; see the twin.
+fn resist(beam: u32, slot: u32, pair: Pair, pressed: f32, push: ptr<function, Push>) {
+    let s = (*push).at.x / (*push).weight;
+    let t = (*push).at.y / (*push).weight;
+    let normal = ((*push).own[0] + (*push).own[1]) * (1.0 / pressed);
+    let between = relative(pair, s, t);
+    let frequency = sqrt(between.square);
+    let contact = max((*push).stiffness, pair.strengths.x * LEAST);
+    let half_step = 0.5 * row.dt_mid * between.square / contact;
+    let approach = dot(between.motion, normal);
+    let free = approach + half_step * pressed;
+    var mean = approach;
+    if !(approach > 0.0) {
+        mean = min(free, 0.0);
+    }
+    let viscosity = 2.0 * params.damping * contact / frequency;
+    let held = viscosity / (1.0 + params.damping * frequency * row.dt_mid);
+    let normal_force = max(pressed - held * mean, 0.0);
+    let drag = pressed - normal_force;
+    add_sum(beam, SUM_DAMPING, drag * (0.5 * (approach + free) - half_step * drag) * row.dt_mid);
+    var force = normal * -drag;
+    var row_sum = held * (2.0 / row.dt);
+#if FRICTION
+    let at = SLOT_STATE * slot;
+    let tangential = tangential_of(beam);
+    let elastic = vec3<f32>(states[at + 1u], states[at + 2u], states[at + 3u]);
+    let limit = params.friction * normal_force;
+    let slid = slide(elastic, between.motion * elapsed(), normal, tangential, limit);
+    add_sum(beam, SUM_FRICTION, slid.dissipated);
+    add_sum(beam, SUM_SLIP, slid.slip);
+    add_sum(beam, SUM_ENERGY, 0.5 * tangential * dot(slid.elastic, slid.elastic));
+    states[at + 1u] = slid.elastic.x;
+    states[at + 2u] = slid.elastic.y;
+    states[at + 3u] = slid.elastic.z;
+    force = force - slid.elastic * tangential;
+    row_sum = row_sum + max(tangential - (*push).stiffness, 0.0);
+#endif
+    (*push).own[0] = force * (1.0 - s) + (*push).own[0];
+    (*push).own[1] = force * s + (*push).own[1];
+    (*push).others[0] = force * (t - 1.0) + (*push).others[0];
+    (*push).others[1] = force * -t + (*push).others[1];
+    (*push).own_rows = (*push).own_rows + row_sum * vec2<f32>(1.0 - s, s);
+    (*push).other_rows = (*push).other_rows + row_sum * vec2<f32>(1.0 - t, t);
+}
+
+// Whether components of a force fit their integers; else names the node.
+fn is_in_range(force_quanta: vec3<f32>, node: u32) -> bool {
+    let fits = all(abs(force_quanta) < vec3<f32>(134217728.0));
+    if !fits || !(is_finite(force_quanta.x) && is_finite(force_quanta.y) && is_finite(force_quanta.z)) {
+        atomicOr(&status[FLAGS], FORCE_RANGE);
+        atomicStore(&status[CULPRIT], node);
+        return false;
+    }
+    return true;
+}
+
+// Adds a force in quanta to a node.
+fn add_force(node: u32, whole: vec3<i32>) {
+    let plane = arrayLength(&forces) / 3u;
+    atomicAdd(&forces[node], whole.x);
+    atomicAdd(&forces[node + plane], whole.y);
+    atomicAdd(&forces[node + 2u * plane], whole.z);
+}
+
+// Adds forces on the ends of both pieces to their nodes, in integers whose sum is zero.
+fn add_forces(pair: Pair, push: Push) {
+    var left = vec3<i32>(0);
+    for (var n = 0u; n < 8u; n++) {
+        var node = pair.nodes[0][n & 3u];
+        var force = push.own[0] * pair.weights[0][0][n & 3u] + push.own[1] * pair.weights[0][1][n & 3u];
+        if n > 3u {
+            node = pair.nodes[1][n & 3u];
+            force = push.others[0] * pair.weights[1][0][n & 3u] + push.others[1] * pair.weights[1][1][n & 3u];
+        }
+        let force_quanta = force * (1.0 / params.force_quantum);
+        if !is_in_range(force_quanta, node) {
+            return;
+        }
+        var whole = left;
+        if n < 7u {
+            whole = vec3<i32>(to_i32(force_quanta.x), to_i32(force_quanta.y), to_i32(force_quanta.z));
+        }
+        left = left - whole;
+        add_force(node, whole);
+    }
+}
+
+// Adds bounds of the stiffness at the ends of both pieces, times the sum of the weights of both.
+fn add_rows(pair: Pair, push: Push, weights: f32) {
+    add_stiffness(push.own_rows.x * weights, Weighted(4u, pair.nodes[0], pair.weights[0][0]));
+    add_stiffness(push.own_rows.y * weights, Weighted(4u, pair.nodes[0], pair.weights[0][1]));
+    add_stiffness(push.other_rows.x * weights, Weighted(4u, pair.nodes[1], pair.weights[1][0]));
+    add_stiffness(push.other_rows.y * weights, Weighted(4u, pair.nodes[1], pair.weights[1][1]));
+}
+
+// Forces of a beam, whose piece is known, and that of a slot; whether they touch.
+fn touches_pair(beam: u32, own: Piece, slot: u32) -> bool {
+    let candidate = of_key(keys[slot]);
+    let other = candidate.body;
+    let lines = pieces(beam, own, other, candidate.image);
+    let reach = reach_now();
+    let strengths = params.thread_thread * vec2<f32>(beams[TABLE * beam + 3u], beams[TABLE * other + 3u]);
+    let depth = reach - distance_of(lines.now);
+    var push: Push;
+    if depth > 0.0 {
+        push = push_of(lines.now, reach, strengths.x, owns(beam, other, candidate.image));
+    }
+    let s = SLOT_STATE * slot;
+    if !(push.weight > 0.0) {
+        release(beam, s);
+        states[s] = min(depth, 0.0);
+        return false;
+    }
+    add_sum(beam, SUM_ENERGY, push.energy);
+    add_sum(beam, SUM_RADIUS, push.growth * growth_now());
+    let pair = Pair(
+        array<vec4<u32>, 2>(nodes_of(beam), nodes_of(other)),
+        array<array<vec4<f32>, 2>, 2>(weights_of(beam), weights_of(other)),
+        strengths,
+        lines.rest,
+    );
+    let pressed = norm(push.own[0] + push.own[1]);
+    if pressed > 0.0 {
+        resist(beam, slot, pair, pressed, &push);
+    } else {
+        release(beam, s);
+    }
+    states[s] = pressed;
+#if PERIODIC
+    add_virial(beam, push.own[1], lines.rest.along);
+    add_virial(beam, push.others[0], lines.rest.start);
+    add_virial(beam, push.others[1], lines.rest.start + lines.rest.other);
+#endif
+    add_forces(pair, push);
+    add_rows(pair, push, most_weights(beam) + most_weights(other));
+    raise(PENETRATION + 2u, depth);
+    return true;
 }
 
 fn force(beam: u32) {
     let slots = params.beam_slots;
-    if keys[slots * beam] == EMPTY {
+    let first = slots * beam;
+    if keys[first] == EMPTY {
         return;
-    }
-    let radius = params.thread_radius * row.radius;
-    let elapsed = row.dt_mid + row.dt_mid - row.dt;
-#if FRICTION
-    let tangential = params.thread_thread * params.tangential;
-#endif
-    let growth = 2.0 * params.thread_radius * row.radius_increment;
-    var can_touch = false;
-    for (var slot = 0u; slot < slots; slot++) {
-        let pair = keys[slots * beam + slot];
-        if pair == EMPTY {
-            break;
-        }
-        let s = SLOT_STATE * (slots * beam + slot);
-        if states[s] < 0.0 {
-            states[s] = states[s] + row.approach * mean_weights(beam, of_key(pair).body) * elapsed + growth;
-        }
-        can_touch = can_touch || !(states[s] < 0.0);
     }
     sums[SUMS * beam + SUM_ENERGY] = 0.0;
-    if !can_touch {
+    if !can_touch(beam) {
         return;
     }
-    var energy = 0.0;
+    let own = piece(beam);
     var touches = false;
-    let own = vector(beam);
-    let along = own.reference + own.change;
-    let aside = bow(beam);
-    for (var slot = 0u; slot < slots; slot++) {
-        let pair = keys[slots * beam + slot];
-        if pair == EMPTY {
+    for (var slot = first; slot < first + slots; slot++) {
+        if keys[slot] == EMPTY {
             break;
         }
-        let candidate = of_key(pair);
-        let other = candidate.body;
-        let s = SLOT_STATE * (slots * beam + slot);
-        if states[s] < 0.0 {
-            continue;
+        if !(states[SLOT_STATE * slot] < 0.0) {
+            touches = touches_pair(beam, own, slot) || touches;
         }
-        let apart = between(beam, aside, other, candidate.image);
-        let theirs = vector(other);
-        let direction = theirs.reference + theirs.change;
-        let st = closest_points(along, direction, apart.current);
-        let offset = along * st.x - (direction * st.y + apart.current);
-        let distance = norm(offset);
-        let depth = radius + radius - distance;
-#if FRICTION
-        let elastic = vec3<f32>(states[s + 1u], states[s + 2u], states[s + 3u]);
-#endif
-        if depth <= 0.0 || distance < 1e-6 {
-            states[s] = min(depth, 0.0);
-#if FRICTION
-            add_sum(beam, SUM_FRICTION, 0.5 * tangential * dot(elastic, elastic));
-            states[s + 1u] = 0.0;
-            states[s + 2u] = 0.0;
-            states[s + 3u] = 0.0;
-#endif
-            continue;
-        }
-        touches = true;
-        let normal = offset * (1.0 / distance);
-        let nodes = line_nodes(beam, st.x);
-        let others = line_nodes(other, st.y);
-        var motion = vec3<f32>(0.0);
-        var inverse_mass = 0.0;
-        for (var i = 0u; i < 4u; i++) {
-            motion = velocity_at(nodes.nodes[i]) * nodes.weights[i] + motion;
-            inverse_mass = inverse_mass + nodes.weights[i] * nodes.weights[i] / mass[nodes.nodes[i]];
-        }
-        for (var i = 0u; i < 4u; i++) {
-            motion = velocity_at(others.nodes[i]) * -others.weights[i] + motion;
-            inverse_mass = inverse_mass + others.weights[i] * others.weights[i] / mass[others.nodes[i]];
-        }
-        let rest = own.reference * st.x - (theirs.reference * st.y + apart.reference);
-#if PERIODIC
-        motion = motion + apply(rate(), rest);
-#endif
-        let approach = dot(motion, normal);
-        let pressed = press(params.thread_thread, depth, inverse_mass, approach);
-        add_sum(beam, SUM_DAMPING, (pressed.elastic_force - pressed.pressing) * approach * elapsed);
-        add_sum(beam, SUM_RADIUS, pressed.elastic_force * growth);
-        states[s] = pressed.pressing;
-        var stored = pressed.elastic_force * depth;
-        var push = normal * pressed.pressing;
-#if FRICTION
-        let limit = params.friction * pressed.pressing;
-        let slid = slide(elastic, motion * elapsed, normal, tangential, limit);
-        add_sum(beam, SUM_FRICTION, slid.dissipated);
-        add_sum(beam, SUM_SLIP, slid.slip);
-        states[s + 1u] = slid.elastic.x;
-        states[s + 2u] = slid.elastic.y;
-        states[s + 3u] = slid.elastic.z;
-        stored = stored + tangential * dot(slid.elastic, slid.elastic);
-        push = push - slid.elastic * tangential;
-#endif
-        energy = energy + 0.5 * stored;
-#if PERIODIC
-        add_virial(beam, push, rest);
-#endif
-        add_pair(push, nodes, others);
-        let row_sum = pressed.row_sum * mean_weights(beam, other);
-        add_stiffness(row_sum, nodes);
-        add_stiffness(row_sum, others);
-        raise(PENETRATION + 2u, depth);
     }
-    sums[SUMS * beam + SUM_ENERGY] = energy;
     if touches {
         atomicAdd(&status[TOUCHING + 2u], 1u);
     }

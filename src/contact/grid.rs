@@ -1,4 +1,4 @@
-//! The grid of the contact search: slabs of yarns (some faces around one slice of one yarn) and beams, each in every cell
+//! The grid of the contact search: slabs of yarns (some neighbouring faces) and beams, each in every cell
 //! that its box touches.
 //!
 //! Cells are taken in the pulled-back plane F̄⁻¹x, where the periodic cell keeps its rectangle; a distance ρ in space is at
@@ -6,7 +6,7 @@
 //! Boxes tell how far their items have moved since everything was last searched (see [`super::travel`]).
 
 use super::bow::Bows;
-use super::face::{Place, Surface};
+use super::face::{FACE, Surface, of_coded};
 use super::{Params, status};
 use crate::elements::beam2;
 use crate::kernel::lane::{Lane, Real};
@@ -25,8 +25,8 @@ pub const BOX: usize = 12;
 pub const MOTION: usize = 6;
 /// Largest motion that a box tells of, quanta: 2 mm, which are whole numbers in f32.
 const MOST_MOTION: i32 = 1 << 24;
-/// Integers of a slab: body, slice, first face around the ring.
-pub const SLAB: usize = 3;
+/// Integers of a slab: its first face, and how many follow each other.
+pub const SLAB: usize = 2;
 /// Faces of a slab at most.
 pub const SLAB_FACES: usize = 8;
 /// More than rounding moves a place in the plane, mm: an item must not be in too few cells.
@@ -37,10 +37,9 @@ pub const QUANTA: usize = 1;
 pub const REMAINDER: usize = 2;
 /// See [`SLAB`].
 pub const SLABS: usize = 3;
-pub const BODIES: usize = 4;
-pub const RING_LINES: usize = 5;
+pub const FACES: usize = 4;
 /// Displacements when everything was last searched, in quanta.
-const SLAB_BEFORE: usize = 6;
+const SLAB_BEFORE: usize = 5;
 /// Of beams, where those of slabs are.
 pub const ENDS: usize = 3;
 pub const BEAMS: usize = 4;
@@ -151,12 +150,40 @@ pub fn has_moved<R: Real>(bounds: &[R], low: [R; 3], high: [R; 3], apart: R) -> 
     beyond(0) || beyond(1) || beyond(2)
 }
 
-/// The box of an item in the pulled-back plane and in height, from its first node, mm, and the motion of its nodes, quanta.
+/// Least and greatest motion of some nodes, quanta.
+pub struct Moved {
+    least: [i32; 3],
+    greatest: [i32; 3],
+}
+
+impl Moved {
+    /// No node.
+    #[inline(always)]
+    pub fn none() -> Self {
+        Self { least: [MOST_MOTION; 3], greatest: [-MOST_MOTION; 3] }
+    }
+
+    /// With a node that has moved.
+    #[inline(always)]
+    pub fn add(&mut self, motion: [i32; 3]) {
+        for (k, along) in motion.into_iter().enumerate() {
+            self.least[k] = self.least[k].min(along);
+            self.greatest[k] = self.greatest[k].max(along);
+        }
+    }
+
+    /// As numbers of a box.
+    #[inline(always)]
+    pub fn bounds<R: Real>(&self) -> ([R; 3], [R; 3]) {
+        ([0, 1, 2].map(|k| R::from_i32(self.least[k])), [0, 1, 2].map(|k| R::from_i32(self.greatest[k])))
+    }
+}
+
+/// The box of an item in the pulled-back plane and in height, from its first node, mm, and the motion of its nodes.
 struct Bounds<R> {
     low: [R; 3],
     high: [R; 3],
-    least: [i32; 3],
-    greatest: [i32; 3],
+    moved: Moved,
 }
 
 impl<R: Real> Bounds<R> {
@@ -164,16 +191,7 @@ impl<R: Real> Bounds<R> {
     #[inline(always)]
     fn new() -> Self {
         let zero = [R::from_f64(0.0); 3];
-        Self { low: zero, high: zero, least: [MOST_MOTION; 3], greatest: [-MOST_MOTION; 3] }
-    }
-
-    /// With the motion of a node.
-    #[inline(always)]
-    fn moves(&mut self, motion: [i32; 3]) {
-        for (k, along) in motion.into_iter().enumerate() {
-            self.least[k] = self.least[k].min(along);
-            self.greatest[k] = self.greatest[k].max(along);
-        }
+        Self { low: zero, high: zero, moved: Moved::none() }
     }
 
     /// With the end of a vector from the first node.
@@ -215,7 +233,8 @@ impl<'a, R: Real> Grid<'a, R> {
     #[inline(always)]
     fn put<const PERIODIC: bool>(&mut self, io: &Io<R>, item: usize, origin: usize, bounds: Bounds<R>, reach: R) {
         let Self { params, inverse, counts, lists, boxes, flags } = self;
-        let Bounds { low, high, least, greatest } = bounds;
+        let Bounds { low, high, moved } = bounds;
+        let (least, greatest): ([R; 3], [R; 3]) = moved.bounds();
         let (base, height) = absolute(io, [REFERENCE, QUANTA, REMAINDER], inverse, origin);
         let half = R::from_f64(0.5);
         boxes.item(0, item).copy_from_slice(&[
@@ -225,12 +244,12 @@ impl<'a, R: Real> Grid<'a, R> {
             height + high[2],
             half * (high[0] - low[0]),
             half * (high[1] - low[1]),
-            R::from_i32(least[0]),
-            R::from_i32(least[1]),
-            R::from_i32(least[2]),
-            R::from_i32(greatest[0]),
-            R::from_i32(greatest[1]),
-            R::from_i32(greatest[2]),
+            least[0],
+            least[1],
+            least[2],
+            greatest[0],
+            greatest[1],
+            greatest[2],
         ]);
         let range = |k: usize| {
             let reach = reach * (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt();
@@ -261,8 +280,7 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
         let mut grid = Grid::new::<PERIODIC>(io, SLAB_BEFORE + 1);
         let inverse = grid.inverse;
         let surface = Surface::<_, PERIODIC> {
-            bodies: bytemuck::cast_slice(io.uints(BODIES)),
-            ring_lines: io.uints(RING_LINES),
+            faces: io.uints(FACES),
             reference: Lattice::new(io, REFERENCE),
             displacement: Displacements::new(io, QUANTA, REMAINDER),
             gradient: &io.row.gradient,
@@ -270,17 +288,16 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
         };
         let slabs = io.uints(SLABS);
         let reach = L::Scalar::from_f64(f64::from(grid.params.thread_radius + grid.params.skin));
+        let zero = [L::Scalar::from_f64(0.0); 3];
         for item in items {
-            let slab = &slabs[SLAB * item..][..SLAB];
-            let (body, slice, first) = (slab[0] as usize, slab[1] as i32, slab[2] as i32);
-            let origin = surface.node(body, [0, 0], Place { ring: first, slice }).0;
-            let last = (first + SLAB_FACES as i32).min(surface.bodies[body].ring as i32);
+            let (first, count) = (slabs[SLAB * item] as usize, slabs[SLAB * item + 1] as usize);
+            let origin = of_coded(surface.faces[FACE * first]).0;
             let mut bounds = Bounds::new();
-            for ring in first..=last {
-                for slice in [slice, slice + 1] {
-                    let (node, shift) = surface.node(body, [0, 0], Place { ring, slice });
-                    bounds.grow(&inverse, surface.from_slave(origin, node, shift).1);
-                    bounds.moves(motion(io, [QUANTA, REMAINDER, SLAB_BEFORE], node));
+            for face in first..first + count {
+                let corners = surface.corners(face, [0, 0], origin, (zero, zero));
+                for a in 0..4 {
+                    bounds.grow(&inverse, corners.current[a]);
+                    bounds.moved.add(motion(io, [QUANTA, REMAINDER, SLAB_BEFORE], corners.nodes[a]));
                 }
             }
             grid.put::<PERIODIC>(io, item, origin, bounds, reach);
@@ -309,7 +326,7 @@ impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
             bounds.grow(&inverse, add(bow, add(d, change)));
             let (first, last) = (ends[2 * beam] as usize, ends[2 * beam + 1] as usize);
             for node in [first, last] {
-                bounds.moves(motion(io, [QUANTA, REMAINDER, BEAM_BEFORE], node));
+                bounds.moved.add(motion(io, [QUANTA, REMAINDER, BEAM_BEFORE], node));
             }
             grid.put::<PERIODIC>(io, item, first, bounds, reach);
         }

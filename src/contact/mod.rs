@@ -1,18 +1,21 @@
-//! Contact: nodes of threads and of yarn surfaces against the structured surfaces of other yarns, and beams against beams.
+//! Contact: points of threads and nodes of yarn surfaces against the surfaces of yarns, and beams against beams.
 //!
 //! A scene has the kinds of pairs that it calls for, each with stages of its own, and friction only if something rubs.
 //!
-//! `grid` sorts slabs of yarns and beams into cells, `candidates` finds for each slave which bodies are near and at which
-//! face, and every step `penalty` walks from the last face to the closest one, over a surface that is a grid of
-//! rings and slices. `threads` does the same for pairs of beams, whose lines `bow` lays. Forces and contact stiffness are added as integers, so
+//! Yarns have closed surfaces of `face`s. `grid` sorts slabs of faces and beams into cells, `candidates` lists the faces near each
+//! beam and each node of a yarn, and every step `penalty` adds the forces of the listed faces on the points that these carry,
+//! which `arc` lays along beams. `threads` does the same for pairs of beams: `bow` lays their lines, and `segments` integrates
+//! along them. Forces and contact stiffness are added as integers, so
 //! their sum does not depend on the order, and the forces of a pair cancel exactly.
 
+pub mod arc;
 pub mod bow;
 pub mod candidates;
 pub mod face;
 pub mod friction;
 pub mod grid;
 pub mod penalty;
+pub mod segments;
 pub mod slip;
 pub mod threads;
 pub mod tie;
@@ -21,25 +24,6 @@ pub mod travel;
 use crate::kernel::lane::Real;
 use bytemuck::{Pod, Zeroable};
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
-
-/// A body with a structured surface, as the kernels see it.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable, PartialEq, Eq)]
-pub struct Body {
-    /// Where the body's ring starts in the table of ring lines.
-    pub ring_start: u32,
-    /// Nodes on the ring around a section.
-    pub ring: u32,
-    /// Slices along the fibre.
-    pub slices: u32,
-    /// 1 if the last slice is followed by the first.
-    pub closed: u32,
-    /// Image of the slice behind the last, in periods along x and y.
-    pub wrap: [i32; 2],
-}
-
-/// Integers of a body in the table.
-pub const BODY: usize = 6;
 
 /// Constants that all contact stages share.
 #[repr(C)]
@@ -51,11 +35,15 @@ pub struct Params {
     pub cells: [u32; 2],
     /// Items that a cell can hold.
     pub capacity: u32,
-    /// Slots of a slave node, and of a beam.
+    /// Faces in the list of a carrier of contact points, and the bodies that a point can touch.
+    pub faces: u32,
     pub slots: u32,
+    /// Slots of a beam.
     pub beam_slots: u32,
     /// Slabs of yarns among the grid's items; beams come after them.
     pub slabs: u32,
+    /// Numbers that a slot of a beam keeps, see [`slot_state`].
+    pub state: u32,
     /// Low corner of the grid and size of its cells, mm.
     pub origin: [f32; 2],
     pub cell: [f32; 2],
@@ -72,19 +60,19 @@ pub struct Params {
     pub stiffness_quantum: f32,
     /// Radius of threads, mm.
     pub thread_radius: f32,
-    /// Penalty of a pair of beams, N/mm.
+    /// Penalty of threads on threads per length, N/mm².
     pub thread_thread: f32,
     /// Arc length within which beams of one thread ignore each other, mm.
     pub self_arc: f32,
+    /// How far the line of a thread may leave the boxes of its beams in the grid, mm.
+    pub beside: f32,
     /// Deepest penetration of a surface node that is still pushed out, mm.
     pub depth: f32,
-    /// Numbers that a slot keeps, see [`slot_state`].
-    pub state: u32,
     /// How far bodies may have moved along an axis relative to each other before candidates are searched again, quanta.
     pub apart: u32,
 }
 
-/// Numbers of a slot: normal force, N, or less what is sure to be left of the gap, mm; with friction then the elastic tangential
+/// Numbers of a slot of a beam: normal force, N, or less what is sure to be left of the gap, mm; with friction then the elastic tangential
 /// displacement, mm (3).
 pub const fn slot_state(friction: bool) -> usize {
     if friction { 4 } else { 1 }
@@ -92,7 +80,7 @@ pub const fn slot_state(friction: bool) -> usize {
 /// Most numbers of a slot.
 pub const MOST_STATE: usize = slot_state(true);
 
-/// What a slave or a beam notes of its candidates: found when everything was last searched, or since, or still to be found.
+/// What a carrier or a beam notes of its candidates: found when everything was last searched, or since, or still to be found.
 pub mod found {
     pub const WITH_ALL: u32 = 0;
     pub const SINCE: u32 = 1;
@@ -118,14 +106,14 @@ pub mod status {
     pub const SPEED: usize = 9;
     /// A node whose contact force outgrew its integer.
     pub const CULPRIT: usize = 10;
-    /// Slaves and beams whose candidates were searched.
+    /// Carriers and beams whose candidates were searched.
     pub const SEARCHED: usize = 11;
     /// Size of the buffer.
     pub const SIZE: usize = 16;
 
     /// A cell of the grid is full.
     pub const CELL_FULL: u32 = 1;
-    /// The slots of a slave node or beam are full.
+    /// The list of a carrier, the slots of a point or of a beam are full.
     pub const SLOTS_FULL: u32 = 2;
     /// A contact force outgrew its integer.
     pub const FORCE_RANGE: u32 = 4;
@@ -151,60 +139,6 @@ pub fn of_key(key: u32) -> (usize, [i32; 2]) {
 #[inline(always)]
 pub fn shift<const PERIODIC: bool>(period: [i32; 2], image: [i32; 2]) -> [i32; 2] {
     if PERIODIC { [image[0].wrapping_mul(period[0]), image[1].wrapping_mul(period[1])] } else { [0; 2] }
-}
-
-/// A force on a slave and on the corners of a face that it touches, in quanta whose sum is zero.
-#[derive(Clone, Copy)]
-pub struct Split {
-    pub slave: [i32; 3],
-    pub corners: [[i32; 3]; 4],
-}
-
-impl Split {
-    /// A force on `slave` whose opposite acts on corners by weights; none if it is out of range, which stops the run.
-    #[inline(always)]
-    pub fn new<R: Real>(status: &[AtomicU32], force: [R; 3], quantum: R, slave: usize, weights: [R; 4]) -> Self {
-        let mut split = Self { slave: [0; 3], corners: [[0; 3]; 4] };
-        for (k, force) in force.into_iter().enumerate() {
-            let quanta = force / quantum;
-            if !is_in_range(status, quanta, slave) {
-                return split;
-            }
-            let mut rest = quanta.to_i32();
-            split.slave[k] = rest;
-            for (a, weight) in weights.into_iter().enumerate() {
-                let part = if a + 1 == weights.len() { rest } else { (quanta * weight).to_i32() };
-                rest -= part;
-                split.corners[a][k] = part.wrapping_neg();
-            }
-        }
-        split
-    }
-
-    /// Adds another force between the same nodes.
-    #[inline(always)]
-    pub fn add(&mut self, other: &Self) {
-        add_quanta(&mut self.slave, other.slave);
-        for a in 0..4 {
-            add_quanta(&mut self.corners[a], other.corners[a]);
-        }
-    }
-
-    /// Adds what acts on corners to their nodes.
-    #[inline(always)]
-    pub fn add_to_corners(&self, forces: &[AtomicI32], nodes: [usize; 4]) {
-        for (node, part) in nodes.into_iter().zip(self.corners) {
-            add_force(forces, node, part);
-        }
-    }
-}
-
-/// Adds a force in quanta to another one; like sums of atomics, it wraps around.
-#[inline(always)]
-pub fn add_quanta(to: &mut [i32; 3], quanta: [i32; 3]) {
-    for k in 0..3 {
-        to[k] = to[k].wrapping_add(quanta[k]);
-    }
 }
 
 /// Adds a force in quanta to a node.

@@ -1,9 +1,29 @@
-//! Penalty contact of slave nodes with the surfaces of yarns, every step, for the candidates of each slave that can touch: one
-//! with a gap is left alone until the gap can have closed at the largest speed there is.
+//! Penalty contact of points with the closed surfaces of yarns, every step: points along the beams of a thread, and the nodes of
+//! yarn surfaces.
+//!
+//! The force is the gradient of one energy. With b(d) = ½ k ⟨r − d⟩² of the distance d to a closed feature, ⟨·⟩ the positive
+//! part, a point of radius r has
+//!
+//! ```text
+//! Ψ = Σ_faces b − Σ_edges b + Σ_corners b  +  inside · [½ k (r + d)² − b(d)]
+//! ```
+//!
+//! The signed sum is ∫ −b′(ρ) χ(ρ) dρ with χ(ρ) the Euler characteristic of the surface within ρ of the point: 1 for a piece
+//! of it, 2 for two walls, however it is cut into faces. So a flat or convex surface pushes with b of its distance, both walls
+//! of a valley push, and the force is continuous across edges and corners (inclusion and exclusion, as in Li et al.,
+//! Convergent Incremental Potential Contact, 2023; its reading as an Euler characteristic is our own).
+//!
+//! A body is closed: a point is inside if it lies behind what of the surface is nearest, and what is nearest then pushes
+//! it out. On the surface both parts of the energy meet. The nodes of yarns have no radius, and of the energy ½ k d² is left.
+//!
+//! What a pair loses is not of the energy: damping of the approach and friction act once for each point and body, along
+//! and across the resultant, where the surface is nearest.
+//!
+//! Every face of a point's list has a gap counter. It is looked at again once bodies can have closed the gap.
 
-use super::face::{Near, Place, Surface};
+use super::face::{Closest, Corners, OnEdge, Patch, Surface, closest, of_coded, on_corner, on_edge};
 use super::friction::slide;
-use super::{BODY, EMPTY, Params, Split, add_force, add_quanta, add_stiffness, of_key, slot_state, status};
+use super::{EMPTY, Params, add_force, add_stiffness, is_in_range, of_key, status};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::row::Row;
@@ -11,15 +31,31 @@ use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
 use std::ops::Range;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
-/// Integers of a slave: node, own body (or [`EMPTY`] for a thread).
-pub const SLAVE: usize = 2;
-/// Numbers of a slave: penalty, N/mm; radius, mm.
-pub const SLAVE_VALUES: usize = 2;
-/// Integers of a slot: key, ring position, slice.
-pub const SLOT_KEYS: usize = 3;
-/// Sums of a slave or a beam: elastic energy now, mJ; over steps, energy lost to contact damping, and work of the growing
+/// Integers of a point: up to four coded nodes that carry it; its list of faces.
+pub const CARRIED: usize = 5;
+/// Numbers of a point: weights of its four nodes; penalty, N/mm; radius, mm.
+pub const POINT: usize = 6;
+/// Integers before the entries of a list, and before the keys of the bodies that a point touches: how often the list was made, and
+/// how often it had been when the point last looked.
+pub const MADE: usize = 1;
+/// Numbers before the gaps of a point, mm: the least gap when faces were last looked at; what bodies can have closed of it
+/// since; how deep the point was inside a body, or may have been. Then the gap of every face of the list.
+pub const LEAST: usize = 0;
+pub const CLOSED: usize = 1;
+pub const INNER: usize = 2;
+pub const GAPS: usize = 3;
+/// More than rounding moves a gap, mm: a face that touches by less than that must not be missed, whenever its gap was last known.
+const GAP_ROUNDING: f64 = 1e-6;
+/// Numbers of a touch: normal force and its part from damping, N; with friction then the elastic tangential displacement, mm (3).
+pub const NORMAL: usize = 0;
+pub const DAMPED: usize = 1;
+pub const ELASTIC: usize = 2;
+pub const fn touch(friction: bool) -> usize {
+    if friction { ELASTIC + 3 } else { ELASTIC }
+}
+/// Sums of a point or a beam: elastic energy now, mJ; over steps, energy lost to contact damping, and work of the growing
 /// radius, mJ.
 pub const SUM_ENERGY: usize = 0;
 pub const SUM_DAMPING: usize = 1;
@@ -37,73 +73,36 @@ pub const fn sums(friction: bool, periodic: bool) -> usize {
     virial(friction) + if periodic { 9 } else { 0 }
 }
 
-pub const SLAVES: usize = 0;
-pub const VALUES: usize = 1;
-pub const BODIES: usize = 2;
-pub const RING_LINES: usize = 3;
-pub const REFERENCE: usize = 4;
-pub const QUANTA: usize = 5;
-pub const REMAINDER: usize = 6;
-pub const VELOCITY: usize = 7;
-pub const MASS: usize = 8;
-const KEYS: usize = 9;
-const STATE: usize = 10;
-const SUM: usize = 11;
-const FORCE: usize = 12;
-const STIFFNESS: usize = 13;
-const STATUS: usize = 14;
+const NODES: usize = 0;
+const POINTS: usize = 1;
+const FACES: usize = 2;
+const NEAR: usize = 3;
+const REFERENCE: usize = 4;
+const QUANTA: usize = 5;
+const REMAINDER: usize = 6;
+const VELOCITY: usize = 7;
+const MASS: usize = 8;
+const GAP: usize = 9;
+const KEYS: usize = 10;
+const TOUCHES: usize = 11;
+const SUM: usize = 12;
+const FORCE: usize = 13;
+const STIFFNESS: usize = 14;
+const STATUS: usize = 15;
 
-/// From the front, contact begins no deeper than two bodies approach in a step, with this margin, mm: what is first seen
-/// deeper inside an open yarn came in through its end, and no side pushes it out. Nor does one push a thread that touched the
-/// rim of the end before: its middle is inside as soon as it has passed the rim, and the energy of the touch is lost. A thread that
-/// came in stays [`INSIDE`] until its middle is out again, and while any side would push it out, a touch of another one does not
-/// count as contact. A side of an open yarn that is found late, deeper than half a thread and than the contact was a step ago, is not
-/// one either: it has been passed where the surface is folded. Bodies may overlap at the start.
-const ENTRY: f64 = 1e-3;
-/// Bound on approach from which on the scene is looked at before it moves, mm/s.
-pub const AT_REST: f64 = 1e20;
-/// Force that stands for a touch without pressure, N.
-const TOUCH: f64 = 1e-30;
-/// And the one that stands for a thread inside an open yarn, N.
-const INSIDE: f64 = 4e-30;
-/// What is smaller is such a mark and no force, N.
-pub const LEAST_FORCE: f64 = 1e-29;
+/// Nodes that carry a point: those of a beam and one to either side, or one node of a yarn.
+pub const fn carried_by(thread: bool) -> usize {
+    if thread { 4 } else { 1 }
+}
 
-/// Contact forces of the nodes of threads (`THREAD`) or of yarn surfaces on yarns.
+/// Contact forces of points of threads (`THREAD`) or of nodes of yarn surfaces on yarns.
 pub struct Penalty<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool>;
 
-/// The first of the faces that push a slave: friction acts there, and is added to nodes together with the normal force.
-#[derive(Clone, Copy)]
-struct First<R> {
-    motion: Vector<R>,
-    apart: Vector<R>,
-    nodes: [usize; 4],
-    weights: [R; 4],
-    split: Split,
-}
-
-/// What presses two bodies apart.
-pub struct Press<R> {
-    /// Penalty times depth, N.
-    pub elastic_force: R,
-    /// With damping, never pulling, N.
-    pub pressing: R,
-    /// Row sum of stiffness and damping for the time step, N/mm.
-    pub row_sum: R,
-}
-
-/// Penalty force of a pair at `depth` (mm) with `approach` (mm/s, negative when closing) and the inverse of its joint mass
-/// `inverse` (1/tonne).
+/// Viscosity, N·s/mm, that damps a spring of `penalty` (N/mm) between masses of joint inverse `inverse` (1/tonne) by the share of
+/// the critical one that is asked for.
 #[inline(always)]
-pub fn press<R: Real>(params: &Params, row: &Row<R>, penalty: R, depth: R, inverse: R, approach: R) -> Press<R> {
-    let two = R::from_f64(2.0);
-    let viscosity = R::from_f64(f64::from(params.damping)) * two * (penalty / inverse).sqrt();
-    let elastic_force = penalty * depth;
-    Press {
-        elastic_force,
-        pressing: (elastic_force - viscosity * approach).max(R::from_f64(0.0)),
-        row_sum: two * (penalty + viscosity * (two / row.dt)),
-    }
+fn viscosity<R: Real>(params: &Params, penalty: R, inverse: R) -> R {
+    R::from_f64(f64::from(params.damping)) * R::from_f64(2.0) * (penalty / inverse).sqrt()
 }
 
 /// Subtracts force ⊗ ΔX from the nine sums that make the homogenised stress.
@@ -117,6 +116,447 @@ pub fn add_virial<R: Real>(sum: &mut [R], force: Vector<R>, apart: Vector<R>) {
     }
 }
 
+/// What stays of a point from step to step, and its sums.
+struct Kept<'a, R> {
+    gaps: &'a mut [R],
+    keys: &'a mut [u32],
+    touches: &'a mut [R],
+    sums: &'a mut [R],
+}
+
+impl<R: Real> Kept<'_, R> {
+    /// With a new list all faces are looked at, wherever the point may be: up to `depth` (mm) inside.
+    #[inline(always)]
+    fn renew(&mut self, made: u32, depth: R) {
+        if self.keys[0] != made {
+            self.keys[0] = made;
+            self.gaps.fill(R::from_f64(0.0));
+            self.gaps[INNER] = depth;
+        }
+    }
+}
+
+/// What one step reads and adds to.
+struct Step<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> {
+    params: Params,
+    row: &'a Row<R>,
+    /// Time since the positions before, s.
+    elapsed: R,
+    surface: Surface<'a, R, PERIODIC>,
+    velocity: Field<'a, R>,
+    mass: &'a [R],
+    forces: &'a [AtomicI32],
+    stiffness: &'a [AtomicI32],
+    flags: &'a [AtomicU32],
+    /// Place of the kind of points in the status.
+    kind: usize,
+}
+
+/// A point that may touch something.
+struct Point<R, const N: usize> {
+    nodes: [usize; N],
+    weights: [R; N],
+    /// From its first node, in the reference and now.
+    from: (Vector<R>, Vector<R>),
+    penalty: R,
+    full_radius: R,
+    radius: R,
+    /// Sum of the sizes of the weights.
+    size: R,
+}
+
+/// A face, its closest point, and what acts on its corners, N.
+#[derive(Clone, Copy)]
+struct Pressed<R> {
+    found: bool,
+    corners: Corners<R>,
+    point: Closest<R>,
+    pull: [Vector<R>; 4],
+}
+
+/// What a body does to a point.
+struct Pushed<R> {
+    /// Where its surface is nearest; what acts there is added to nodes last.
+    nearest: Pressed<R>,
+    /// Resultant of the elastic forces on the point, N, and their energy, mJ.
+    push: Vector<R>,
+    energy: R,
+    /// Sum of the elastic forces along their own directions, N: what the energy gains for each mm of radius.
+    pressing: R,
+    /// Features that push.
+    features: R,
+}
+
+impl<R: Real> Pushed<R> {
+    #[inline(always)]
+    fn none() -> Self {
+        let zero = R::from_f64(0.0);
+        let corners = Corners { nodes: [0; 4], reference: [[zero; 3]; 4], current: [[zero; 3]; 4] };
+        let (weights, away) = ([zero; 4], [zero; 3]);
+        let point = Closest { weights, away, distance: zero, height: zero, interior: false };
+        let nearest = Pressed { found: false, corners, point, pull: [[zero; 3]; 4] };
+        Self { nearest, push: [zero; 3], energy: zero, pressing: zero, features: zero }
+    }
+
+    /// Whether a place is nearer than what is known. Of faces whose common edge or corner is nearest, the one that is seen most
+    /// steeply tells on which side the point is.
+    #[inline(always)]
+    fn is_nearer(&self, point: &Closest<R>) -> bool {
+        let known = &self.nearest.point;
+        let tie = known.distance * R::from_f64(1e-4) + R::from_f64(1e-7);
+        let apart = point.distance - known.distance;
+        !self.nearest.found || apart < -tie || apart <= tie && point.height.abs() > known.height.abs()
+    }
+
+    /// Whether the point is behind the nearest place that is known, no deeper than what is pushed out.
+    #[inline(always)]
+    fn is_behind(&self, params: &Params) -> bool {
+        let Pressed { found, point, .. } = &self.nearest;
+        *found && point.height < R::from_f64(0.0) && point.distance < R::from_f64(f64::from(params.depth))
+    }
+
+    /// Distance from which on a face cannot change what is nearest, mm.
+    #[inline(always)]
+    fn beyond(&self) -> R {
+        self.nearest.point.distance * R::from_f64(1.0 - 2e-4) - R::from_f64(2e-7)
+    }
+
+    /// Adds an elastic `force` (N) of a feature and its `energy` (mJ) on the point; notes its opposite on the corners of its face.
+    #[inline(always)]
+    fn add(&mut self, pull: &mut [Vector<R>; 4], weights: [R; 4], away: Vector<R>, force: R, energy: R) {
+        self.push = fma(away, force, self.push);
+        self.energy = self.energy + energy;
+        self.pressing = self.pressing + force;
+        for a in 0..4 {
+            pull[a] = fma(away, -(force * weights[a]), pull[a]);
+        }
+    }
+
+    /// Adds an edge or a corner within the radius, with its `sign` in the sum.
+    #[inline(always)]
+    fn add_border<const N: usize>(
+        &mut self,
+        pull: &mut [Vector<R>; 4],
+        at: &Point<R, N>,
+        border: &OnEdge<R>,
+        sign: f64,
+    ) {
+        if border.square < at.radius * at.radius {
+            let distance = border.square.sqrt();
+            let depth = at.radius - distance;
+            let force = R::from_f64(sign) * (at.penalty * depth);
+            let away = scale(border.offset, R::from_f64(1.0) / distance.max(R::from_f64(1e-12)));
+            self.add(pull, border.weights, away, force, R::from_f64(0.5) * force * depth);
+            self.features = self.features + R::from_f64(sign).max(R::from_f64(0.0));
+        }
+    }
+}
+
+impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTION, PERIODIC> {
+    /// From the bindings of the kernel.
+    #[inline(always)]
+    fn new(io: &'a Io<R>, kind: usize) -> Self {
+        let params: Params = io.params();
+        Self {
+            params,
+            row: io.row,
+            elapsed: io.row.dt_mid + io.row.dt_mid - io.row.dt,
+            surface: Surface {
+                faces: io.uints(FACES),
+                reference: Lattice::new(io, REFERENCE),
+                displacement: Displacements::new(io, QUANTA, REMAINDER),
+                gradient: &io.row.gradient,
+                period: params.period,
+            },
+            velocity: Field::new(io, VELOCITY),
+            mass: io.scalars(MASS),
+            forces: io.atomics(FORCE),
+            stiffness: io.atomics(STIFFNESS),
+            flags: io.atomic_uints(STATUS),
+            kind,
+        }
+    }
+
+    /// How much of a gap a point, of weights whose sizes add up to `size`, can have closed since the positions before, mm.
+    #[inline(always)]
+    fn closing(&self, size: R, full_radius: R) -> R {
+        let reach = R::from_f64(0.5) * (R::from_f64(1.0) + size);
+        self.row.approach * reach * self.elapsed + full_radius * self.row.radius_increment
+    }
+
+    /// What all bodies of a list do to a point, which bodies can have come nearer to by `closed` since faces were last looked at, in
+    /// the last step by `closing`, mm.
+    #[inline(always)]
+    fn all_bodies<const N: usize>(&self, at: &Point<R, N>, list: &[u32], closed: R, closing: R, kept: &mut Kept<R>) {
+        let zero = R::from_f64(0.0);
+        // a point that was inside is no deeper than this now
+        let most = kept.gaps[INNER] + closing + R::from_f64(GAP_ROUNDING);
+        let skin = R::from_f64(f64::from(self.params.skin));
+        let (mut least, mut inner) = (skin, zero);
+        let (mut own, mut energy, mut touching) = ([0i32; 3], zero, false);
+        let mut end = 0;
+        while end < list.len() && list[end] != EMPTY {
+            let (first, body) = (end, self.body(list[end]));
+            let mut nearest = skin;
+            while end < list.len() && list[end] != EMPTY && self.body(list[end]) == body {
+                let gap = &mut kept.gaps[GAPS + end];
+                *gap = *gap - closed;
+                nearest = nearest.min(*gap);
+                end += 1;
+            }
+            if nearest > most {
+                least = least.min(nearest);
+                continue;
+            }
+            let gaps = &mut kept.gaps[GAPS + first..GAPS + end];
+            let mut pushed = self.look(at, &list[first..end], gaps, most, &mut own, kept.sums);
+            least = gaps.iter().fold(least, |least, gap| least.min(*gap));
+            let depth = self.push_out(at, &mut pushed);
+            inner = inner.max(depth);
+            touching |= self.settle(at, body, depth, &mut pushed, &mut own, kept);
+            energy = energy + pushed.energy;
+        }
+        (kept.gaps[LEAST], kept.gaps[CLOSED], kept.gaps[INNER]) =
+            (least - inner - R::from_f64(GAP_ROUNDING), zero, inner);
+        kept.sums[SUM_ENERGY] = energy;
+        if own != [0; 3] {
+            self.share_out(at, own);
+        }
+        if touching {
+            self.flags[status::TOUCHING[self.kind]].fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Damping, friction, and what is left of a body's touch; whether it still touches.
+    #[inline(always)]
+    fn settle<const N: usize>(
+        &self,
+        at: &Point<R, N>,
+        body: u32,
+        depth: R,
+        pushed: &mut Pushed<R>,
+        own: &mut [i32; 3],
+        kept: &mut Kept<R>,
+    ) -> bool {
+        let (zero, size) = (R::from_f64(0.0), const { touch(FRICTION) });
+        let touches = pushed.features > zero;
+        let keys = &mut kept.keys[MADE..];
+        let Some(slot) = place_of(keys, body, touches) else { return false };
+        let touch = &mut kept.touches[size * slot..][..size];
+        self.rub(at, pushed, touch, kept.sums);
+        self.pull(&pushed.nearest, own, kept.sums);
+        let work = pushed.pressing * at.full_radius * self.row.radius_increment;
+        kept.sums[SUM_RADIUS] = kept.sums[SUM_RADIUS] + work;
+        keys[slot] = if touches { body } else { EMPTY };
+        if touches {
+            let outside = (at.radius - pushed.nearest.point.distance).max(zero);
+            let deep = if depth > zero { at.radius + depth } else { outside };
+            raise(&self.flags[status::PENETRATION[self.kind]], deep);
+        } else {
+            touch.fill(zero);
+        }
+        touches
+    }
+
+    /// Adds what a face does to a point, with the edges and corners that it owns; returns the gap, or as much as is sure to be left
+    /// of it, mm. A face whose gap is sure to exceed `most` need not be looked at closely.
+    #[inline(always)]
+    fn face<const N: usize>(
+        &self,
+        at: &Point<R, N>,
+        (face, image): (usize, [i32; 2]),
+        most: R,
+        pushed: &mut Pushed<R>,
+        own: &mut [i32; 3],
+        sums: &mut [R],
+    ) -> R {
+        let corners = self.surface.corners(face, image, at.nodes[0], at.from);
+        let q = &corners.current;
+        let patch = Patch::new(q);
+        let sure = patch.nearest() - at.radius;
+        if sure > most {
+            return sure;
+        }
+        let point = closest(q, &patch);
+        let gap = point.distance - at.radius;
+        let pushes = gap < R::from_f64(0.0);
+        let mut pull = [[R::from_f64(0.0); 3]; 4];
+        if pushes {
+            let marks = self.surface.marks(face);
+            let force = at.penalty * -gap;
+            pushed.add(&mut pull, point.weights, point.away, force, R::from_f64(-0.5) * force * gap);
+            pushed.features = pushed.features + R::from_f64(1.0);
+            for a in 0..4 {
+                if marks >> a & 1 == 1 {
+                    pushed.add_border(&mut pull, at, &on_edge(q, a), -1.0);
+                }
+                if marks >> (4 + a) & 1 == 1 {
+                    pushed.add_border(&mut pull, at, &on_corner(q, a), 1.0);
+                }
+            }
+        }
+        let face = Pressed { found: true, corners, point, pull };
+        if pushed.is_nearer(&point) {
+            let before = std::mem::replace(&mut pushed.nearest, face);
+            if before.found && before.point.distance < at.radius {
+                self.pull(&before, own, sums);
+            }
+        } else if pushes {
+            self.pull(&face, own, sums);
+        }
+        gap
+    }
+
+    /// The body that an entry belongs to.
+    #[inline(always)]
+    fn body(&self, entry: u32) -> u32 {
+        let (face, image) = of_key(entry);
+        self.surface.body(face, image)
+    }
+
+    /// What a body does to a point, by its entries and their gaps: those that are no larger than `most` are looked at.
+    #[inline(always)]
+    fn look<const N: usize>(
+        &self,
+        at: &Point<R, N>,
+        entries: &[u32],
+        gaps: &mut [R],
+        most: R,
+        own: &mut [i32; 3],
+        sums: &mut [R],
+    ) -> Pushed<R> {
+        let mut pushed = Pushed::none();
+        for (gap, entry) in gaps.iter_mut().zip(entries) {
+            if *gap <= most {
+                *gap = self.face(at, of_key(*entry), most, &mut pushed, own, sums);
+            }
+        }
+        if pushed.is_behind(&self.params) {
+            // it is inside only if no other face is nearer
+            for (gap, entry) in gaps.iter_mut().zip(entries) {
+                let beyond = pushed.beyond() - at.radius;
+                if *gap < beyond {
+                    *gap = self.face(at, of_key(*entry), beyond, &mut pushed, own, sums);
+                }
+            }
+        }
+        pushed
+    }
+
+    /// Pushes a point out of a body that it is inside of; returns how deep it is, mm.
+    #[inline(always)]
+    fn push_out<const N: usize>(&self, at: &Point<R, N>, pushed: &mut Pushed<R>) -> R {
+        let (zero, half) = (R::from_f64(0.0), R::from_f64(0.5));
+        if !pushed.is_behind(&self.params) {
+            return zero;
+        }
+        let Pressed { point, mut pull, .. } = pushed.nearest;
+        let depth = point.distance;
+        let (whole, outside) = (at.radius + depth, (at.radius - depth).max(zero));
+        let out = scale(point.away, R::from_f64(-1.0));
+        let energy = half * at.penalty * (whole * whole - outside * outside);
+        pushed.add(&mut pull, point.weights, out, at.penalty * (whole + outside), energy);
+        pushed.features = pushed.features + R::from_f64(1.0);
+        pushed.nearest.pull = pull;
+        depth
+    }
+
+    /// Adds forces to the corners of a face, and their opposite to what acts on the point, as integers whose sum is zero: the last
+    /// corner takes what the rounding of the others leaves.
+    #[inline(always)]
+    fn pull(&self, face: &Pressed<R>, own: &mut [i32; 3], sums: &mut [R]) {
+        let Pressed { corners, pull, .. } = face;
+        let quantum = R::from_f64(f64::from(self.params.force_quantum));
+        let sum = add(add(pull[0], pull[1]), add(pull[2], pull[3])).map(|f| f / quantum);
+        if !sum.iter().all(|q| is_in_range(self.flags, *q, corners.nodes[0])) {
+            return;
+        }
+        let mut rest = sum.map(|q| q.to_i32());
+        for k in 0..3 {
+            own[k] = own[k].wrapping_sub(rest[k]);
+        }
+        for a in 0..4 {
+            let part = if a == 3 { rest } else { pull[a].map(|f| (f / quantum).to_i32()) };
+            for k in 0..3 {
+                rest[k] = rest[k].wrapping_sub(part[k]);
+            }
+            add_force(self.forces, corners.nodes[a], part);
+            if PERIODIC {
+                add_virial(&mut sums[virial(FRICTION)..], pull[a], corners.reference[a]);
+            }
+        }
+    }
+
+    /// What damping and friction take, once for a point and a body, where the surface is nearest: a touch with its state goes on.
+    #[inline(always)]
+    fn rub<const N: usize>(&self, at: &Point<R, N>, pushed: &mut Pushed<R>, touch: &mut [R], sums: &mut [R]) {
+        let (zero, half, two) = (R::from_f64(0.0), R::from_f64(0.5), R::from_f64(2.0));
+        let Pressed { corners, point, .. } = pushed.nearest;
+        let (mut motion, mut apart, mut inverse) = ([zero; 3], [zero; 3], zero);
+        for (node, weight) in at.nodes.into_iter().zip(at.weights) {
+            motion = fma(self.velocity.at(node), weight, motion);
+            inverse = inverse + weight * weight / self.mass[node];
+        }
+        for (a, weight) in point.weights.into_iter().enumerate() {
+            motion = fma(self.velocity.at(corners.nodes[a]), -weight, motion);
+            apart = fma(corners.reference[a], -weight, apart);
+            inverse = inverse + weight * weight / self.mass[corners.nodes[a]];
+        }
+        if PERIODIC {
+            motion = add(motion, apply(&self.row.rate, apart));
+        }
+        let size = norm(pushed.push);
+        let normal = if size > zero { scale(pushed.push, R::from_f64(1.0) / size) } else { point.away };
+        let approach = dot(motion, normal);
+        let viscosity = viscosity(&self.params, at.penalty, inverse);
+        let pressing = (size - viscosity * approach).max(zero);
+        // over the way since the positions before, with the mean of the forces before and now
+        let damped = size - pressing;
+        sums[SUM_DAMPING] = sums[SUM_DAMPING] + half * (touch[DAMPED] + damped) * approach * self.elapsed;
+        (touch[NORMAL], touch[DAMPED]) = (pressing, damped);
+        let mut force = scale(normal, -damped);
+        if FRICTION {
+            let tangential = at.penalty * R::from_f64(f64::from(self.params.tangential));
+            let limit = R::from_f64(f64::from(self.params.friction)) * pressing;
+            let elastic = [touch[ELASTIC], touch[ELASTIC + 1], touch[ELASTIC + 2]];
+            let slid = slide(elastic, scale(motion, self.elapsed), normal, tangential, limit);
+            sums[SUM_FRICTION] = sums[SUM_FRICTION] + slid.dissipated;
+            sums[SUM_SLIP] = sums[SUM_SLIP] + slid.slip;
+            touch[ELASTIC..].copy_from_slice(&slid.elastic);
+            pushed.energy = pushed.energy + half * tangential * dot(slid.elastic, slid.elastic);
+            force = fma(slid.elastic, -tangential, force);
+        }
+        for (pull, weight) in pushed.nearest.pull.iter_mut().zip(point.weights) {
+            *pull = fma(force, -weight, *pull);
+        }
+        let rows = (R::from_f64(1.0) + at.size) * (at.penalty * pushed.features + viscosity * (two / self.row.dt));
+        let quantum = R::from_f64(f64::from(self.params.stiffness_quantum));
+        add_stiffness(self.stiffness, rows, quantum, corners.nodes.into_iter().zip(point.weights));
+        add_stiffness(self.stiffness, rows, quantum, at.nodes.into_iter().zip(at.weights));
+    }
+
+    /// Adds what acts on a point to its nodes.
+    #[inline(always)]
+    fn share_out<const N: usize>(&self, at: &Point<R, N>, own: [i32; 3]) {
+        let mut rest = own;
+        for i in 0..N {
+            let part = if i + 1 == N { rest } else { own.map(|q| (R::from_i32(q) * at.weights[i]).to_i32()) };
+            for k in 0..3 {
+                rest[k] = rest[k].wrapping_sub(part[k]);
+            }
+            add_force(self.forces, at.nodes[i], part);
+        }
+    }
+}
+
+/// The place of a body among the touches of a point; if it `begins` to touch, a free one, of which there are as many as bodies in a
+/// list. `None` if it does not touch.
+#[inline(always)]
+fn place_of(keys: &[u32], key: u32, begins: bool) -> Option<usize> {
+    let known = keys.iter().position(|known| *known == key);
+    known.or_else(|| if begins { keys.iter().position(|known| *known == EMPTY) } else { None })
+}
+
 impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for Penalty<THREAD, FRICTION, PERIODIC> {
     const SHADER: Shader = Shader {
         defines: &[when(THREAD, "THREAD"), when(FRICTION, "FRICTION"), when(PERIODIC, "PERIODIC")],
@@ -126,201 +566,55 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let (state_size, virial) = const { (slot_state(FRICTION), virial(FRICTION)) };
-        let params: Params = io.params();
-        let slots = params.slots as usize;
-        let real = |x: f32| L::Scalar::from_f64(f64::from(x));
-        let constant = L::Scalar::from_f64;
-        let zero = constant(0.0);
-        let surface = Surface::<_, PERIODIC> {
-            bodies: bytemuck::cast_slice(io.uints(BODIES)),
-            ring_lines: io.uints(RING_LINES),
-            reference: Lattice::new(io, REFERENCE),
-            displacement: Displacements::new(io, QUANTA, REMAINDER),
-            gradient: &io.row.gradient,
-            period: params.period,
-        };
-        debug_assert!(io.uints(BODIES).len() % BODY == 0);
-        let velocity = Field::new(io, VELOCITY);
-        let (slaves, values, mass) = (io.uints(SLAVES), io.scalars(VALUES), io.scalars(MASS));
-        let mut keys = io.own::<u32>(KEYS);
-        let mut states = io.own::<L::Scalar>(STATE);
-        let mut sums = io.own::<L::Scalar>(SUM);
-        let (forces, stiffness, flags) = (io.atomics(FORCE), io.atomics(STIFFNESS), io.atomic_uints(STATUS));
-        let elapsed = io.row.dt_mid + io.row.dt_mid - io.row.dt;
-        let mut near = Near::none();
-        for item in items {
-            let slot_keys = keys.item(0, item);
-            if slot_keys[0] == EMPTY {
-                continue;
-            }
-            let slave = slaves[SLAVE * item] as usize;
-            let (penalty, full_radius) = (values[SLAVE_VALUES * item], values[SLAVE_VALUES * item + 1]);
-            let radius = full_radius * io.row.radius;
-            let closing = io.row.approach * elapsed + full_radius * io.row.radius_increment;
-            let slot_states = states.item(0, item);
-            let sum = sums.item(0, item);
-            let mut energy = zero;
-            let mut touches = false;
-            // what acts on the slave is added to it once
-            let (mut own_force, mut own_row_sum) = ([0i32; 3], 0i32);
-            for slot in 0..slots {
-                let at = &mut slot_keys[SLOT_KEYS * slot..][..SLOT_KEYS];
-                if at[0] == EMPTY {
-                    break;
-                }
-                let (body, image) = of_key(at[0]);
-                let state = &mut slot_states[state_size * slot..][..state_size];
-                if state[0] < zero {
-                    state[0] = state[0] + closing;
-                    if state[0] < zero {
-                        continue;
-                    }
-                    if !THREAD {
-                        // until now it was in front
-                        state[0] = zero;
-                    }
-                }
-                let from = Place { ring: at[1] as i32, slice: at[2] as i32 };
-                let open = !surface.is_closed(body);
-                let mut found = surface.walk(slave, body, image, from);
-                if THREAD && open && surface.is_rim(body, found.0, &found.2) {
-                    found = surface.around(slave, body, image, found);
-                }
-                if THREAD && found.2.distance >= radius && !found.2.is_behind() {
-                    found = surface.beside(slave, body, image, found);
-                }
-                let (place, corners, point) = found;
-                (at[1], at[2]) = (place.ring as u32, place.slice as u32);
-                let moves = io.row.approach < constant(AT_REST);
-                let mut inside = false;
-                if THREAD && open && moves {
-                    let was = state[0] == constant(INSIDE);
-                    let comes = point.interior && (state[0] <= zero || surface.is_end(body, place));
-                    let stays = was && !surface.is_rim(body, place, &point);
-                    inside = point.height() < zero && (comes || stays);
-                    if was && !inside {
-                        state[0] = zero;
-                    }
-                }
-                let enters = open && moves && state[0] <= zero;
-                let before = state[0].max(zero) / penalty;
-                let single;
-                // what is behind the border of a cut end is before the end, and not in the yarn
-                let before_end = !THREAD && point.height() < zero && surface.is_rim(body, place, &point);
-                let faces = if inside || before_end {
-                    &[][..]
-                } else if THREAD && point.distance < radius {
-                    near.faces[0] = (corners, point);
-                    surface.faces_within(slave, body, image, place, radius, &mut near);
-                    &near.faces[..near.count]
-                } else {
-                    single = [(corners, point)];
-                    &single[..]
-                };
-                // the normal forces of all faces, and where the closest one is
-                let mut push = [zero; 3];
-                let mut normal_force = zero;
-                let mut first: Option<First<_>> = None;
-                let mut came_in = false;
-                for (corners, point) in faces {
-                    let Some((normal, distance)) = point.normal_and_distance(THREAD) else { continue };
-                    let depth = radius - distance;
-                    if depth <= zero || -distance >= real(params.depth) {
-                        continue;
-                    }
-                    let weights = point.weights();
-                    let mut motion = velocity.at(slave);
-                    let mut apart = [zero; 3];
-                    let mut inverse = constant(1.0) / mass[slave];
-                    for a in 0..4 {
-                        motion = fma(velocity.at(corners.nodes[a]), -weights[a], motion);
-                        apart = fma(corners.reference[a], -weights[a], apart);
-                        inverse = inverse + weights[a] * weights[a] / mass[corners.nodes[a]];
-                    }
-                    if PERIODIC {
-                        motion = add(motion, apply(&io.row.rate, apart));
-                    }
-                    let approach = dot(motion, normal);
-                    let entry = constant(ENTRY) - constant(2.0) * approach.min(zero) * elapsed;
-                    let late = THREAD && open && moves && depth > constant(0.5) * radius;
-                    if (enters || late) && depth > before + entry {
-                        came_in |= enters;
-                        continue;
-                    }
-                    let Press { elastic_force, pressing, row_sum } =
-                        press(&params, io.row, penalty, depth, inverse, approach);
-                    sum[SUM_DAMPING] = sum[SUM_DAMPING] + (elastic_force - pressing) * approach * elapsed;
-                    sum[SUM_RADIUS] = sum[SUM_RADIUS] + elastic_force * full_radius * io.row.radius_increment;
-                    energy = energy + constant(0.5) * elastic_force * depth;
-                    let force = scale(normal, pressing);
-                    push = add(push, force);
-                    normal_force = normal_force + pressing;
-                    if PERIODIC {
-                        add_virial(&mut sum[virial..], force, apart);
-                    }
-                    let split = Split::new(flags, force, real(params.force_quantum), slave, weights);
-                    if first.is_none() {
-                        first = Some(First { motion, apart, nodes: corners.nodes, weights, split });
-                    } else {
-                        add_quanta(&mut own_force, split.slave);
-                        split.add_to_corners(forces, corners.nodes);
-                    }
-                    let stiffness_quantum = real(params.stiffness_quantum);
-                    add_stiffness(stiffness, row_sum, stiffness_quantum, corners.nodes.into_iter().zip(weights));
-                    own_row_sum = own_row_sum.wrapping_add((row_sum / stiffness_quantum).to_i32());
-                    raise(&flags[status::PENETRATION[usize::from(!THREAD)]], depth);
-                }
-                let size = norm(push);
-                let tangential = penalty * real(params.tangential);
-                let Some(First { motion, apart, nodes, weights, mut split }) = first.filter(|_| size > zero) else {
-                    if let Some(first) = &first {
-                        add_quanta(&mut own_force, first.split.slave);
-                        first.split.add_to_corners(forces, first.nodes);
-                    }
-                    if FRICTION {
-                        let elastic = [state[1], state[2], state[3]];
-                        sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
-                        state[1..].fill(zero);
-                    }
-                    if inside {
-                        sum[SUM_DAMPING] = sum[SUM_DAMPING] + constant(0.5) * penalty * before * before;
-                        state[0] = constant(INSIDE);
-                        continue;
-                    }
-                    // a point behind a face keeps being looked at
-                    let gap = if THREAD || point.height() > zero { point.distance - radius } else { zero };
-                    state[0] = if open && first.is_some() && !came_in { constant(TOUCH) } else { -gap.max(zero) };
-                    continue;
-                };
-                touches = true;
-                state[0] = if came_in { zero } else { normal_force };
-                if FRICTION {
-                    let elastic = [state[1], state[2], state[3]];
-                    let limit = real(params.friction) * normal_force;
-                    let normal = scale(push, constant(1.0) / size);
-                    let slid = slide(elastic, scale(motion, elapsed), normal, tangential, limit);
-                    sum[SUM_FRICTION] = sum[SUM_FRICTION] + slid.dissipated;
-                    sum[SUM_SLIP] = sum[SUM_SLIP] + slid.slip;
-                    state[1..].copy_from_slice(&slid.elastic);
-                    energy = energy + constant(0.5) * tangential * dot(slid.elastic, slid.elastic);
-                    let force = scale(slid.elastic, -tangential);
-                    if PERIODIC {
-                        add_virial(&mut sum[virial..], force, apart);
-                    }
-                    split.add(&Split::new(flags, force, real(params.force_quantum), slave, weights));
-                }
-                add_quanta(&mut own_force, split.slave);
-                split.add_to_corners(forces, nodes);
-            }
-            if own_row_sum != 0 || own_force != [0; 3] {
-                add_force(forces, slave, own_force);
-                stiffness[slave].fetch_add(own_row_sum, Ordering::Relaxed);
-            }
-            sum[SUM_ENERGY] = energy;
-            if touches {
-                flags[status::TOUCHING[usize::from(!THREAD)]].fetch_add(1, Ordering::Relaxed);
-            }
+        if THREAD {
+            run::<_, 4, FRICTION, PERIODIC>(io, items, 0);
+        } else {
+            run::<_, 1, FRICTION, PERIODIC>(io, items, 1);
         }
+    }
+}
+
+/// Forces of points that `N` nodes carry, whose places in the status are those of a `kind`.
+#[inline(always)]
+fn run<R: Real, const N: usize, const FRICTION: bool, const PERIODIC: bool>(
+    io: &Io<R>,
+    items: Range<usize>,
+    kind: usize,
+) {
+    let step = Step::<_, FRICTION, PERIODIC>::new(io, kind);
+    let (nodes, points, near) = (io.uints(NODES), io.scalars(POINTS), io.uints(NEAR));
+    let (mut gaps, mut keys, mut touches) = (io.own::<R>(GAP), io.own::<u32>(KEYS), io.own::<R>(TOUCHES));
+    let mut sums = io.own::<R>(SUM);
+    let (zero, faces) = (R::from_f64(0.0), step.params.faces as usize);
+    for item in items {
+        let (coded, list) = nodes[CARRIED * item..][..CARRIED].split_at(CARRIED - 1);
+        let list = &near[(MADE + faces) * list[0] as usize..][..MADE + faces];
+        let values = &points[POINT * item..][..POINT];
+        let weights: [R; N] = std::array::from_fn(|a| values[a]);
+        let size = weights.iter().fold(zero, |size, weight| size + weight.abs());
+        let mut kept = Kept {
+            gaps: gaps.item(0, item),
+            keys: keys.item(0, item),
+            touches: touches.item(0, item),
+            sums: sums.item(0, item),
+        };
+        kept.renew(list[0], R::from_f64(f64::from(step.params.depth)));
+        let closing = step.closing(size, values[5]);
+        let closed = kept.gaps[CLOSED] + closing;
+        if closed < kept.gaps[LEAST] {
+            kept.gaps[CLOSED] = closed;
+            continue;
+        }
+        let coded: [u32; N] = std::array::from_fn(|a| coded[a]);
+        let at = Point {
+            nodes: coded.map(|node| of_coded(node).0),
+            weights,
+            from: step.surface.point(coded, weights),
+            penalty: values[4],
+            full_radius: values[5],
+            radius: values[5] * io.row.radius,
+            size,
+        };
+        step.all_bodies(&at, &list[MADE..], closed, closing, &mut kept);
     }
 }

@@ -1,4 +1,4 @@
-//! How far slaves have slipped since the start, for pictures: taken from the sums of contact before these are set back.
+//! How far contact points have slipped since the start, for pictures: taken from the sums of contact before these are set back.
 
 use super::penalty::{SUM_SLIP, sums};
 use crate::kernel::lane::Lane;
@@ -7,7 +7,7 @@ use crate::kernel::stage::{Io, Kernel};
 use std::ops::Range;
 
 pub const CONTACT_SUMS: usize = 0;
-/// Slip of each slave, mm.
+/// Slip of each point, mm.
 const SLIP: usize = 1;
 
 /// Adds the slip of the last steps.

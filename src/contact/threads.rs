@@ -1,31 +1,37 @@
-//! Contact of beams with beams: closest points of two segments, the beams' lines (see [`super::bow`]), penalty and friction as
-//! for faces.
+//! Contact of beams with beams: which are near, and every step the forces of those that touch, from the line of one thread integrated
+//! over that of the other (see [`super::segments`] and [`super::bow`]), with damping and friction at the point where these act.
+//!
+//! A pair is two beams; the one with the lower number integrates over the other. The pairs of a beam with the beams of one thread that
+//! follow each other are a chain: each takes off the joint with the one before it if that one is in the chain too.
+//!
+//! Two points of a thread that bends to a circle of radius ρ lie 2ρ sin(a/2ρ) apart, with a the arc between them. No bend is tighter
+//! than ρ = r, where the inside folds, so points within an arc of π r, half a turn of the tightest loop, never touch: beams of one
+//! thread with nearer ends closer than that along it are no pair.
 //!
 //! A pair with a gap is left alone until the gap can have closed, as in [`super::penalty`]: points of lines move at most as fast as
 //! nodes times the sum of their weights.
-//!
-//! Every pair within reach counts, also where two beams of a thread are near with their common end: the distance of each
-//! pair is continuous, so the energy is, and nothing is gained as a contact passes from beam to beam.
 
-use super::bow::Bows;
+use super::bow::{Bows, Piece};
 use super::friction::slide;
 use super::grid::{BOX, MOTION, absolute, cell_index, cells, has_moved, inverse, pull_back};
-use super::penalty::{Press, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, press, virial};
-use super::{EMPTY, MOST_STATE, Params, add_pair, add_stiffness, found, key, of_key, shift, slot_state, status};
-use crate::elements::beam2;
+use super::penalty::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
+use super::segments::{Push, Segments};
+use super::{EMPTY, Params, add_force, add_stiffness, found, is_in_range, key, of_key, shift, slot_state, status};
+use crate::elements::beam2::TABLE;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::position::QUANTUM;
+use crate::kernel::row::Row;
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale, sub};
 use std::ops::Range;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
-/// Numbers of a beam's place on its thread: arc length of its middle, mm; its length, mm; length of a closed thread, mm, else 0.
-pub const ARC: usize = 3;
 /// Pairs that a beam can have.
 pub const MOST_PAIRS: usize = 64;
+/// Share of a beam below which the length that touches is not divided by.
+const LEAST: f64 = 1e-6;
 
 pub const ENDS: usize = 0;
 pub const BEAMS: usize = 1;
@@ -50,11 +56,12 @@ struct Scene<'a, R, const PERIODIC: bool> {
     displacement: Displacements<'a, R>,
     gradient: &'a [[R; 3]; 3],
     period: [i32; 2],
+    self_arc: R,
 }
 
 impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
     #[inline(always)]
-    fn new(io: &'a Io<R>, period: [i32; 2]) -> Self {
+    fn new(io: &'a Io<R>, params: &Params) -> Self {
         Self {
             ends: io.uints(ENDS),
             beams: io.scalars(BEAMS),
@@ -62,58 +69,183 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
             reference: Lattice::new(io, REFERENCE),
             displacement: Displacements::new(io, QUANTA, REMAINDER),
             gradient: &io.row.gradient,
-            period,
+            period: params.period,
+            self_arc: R::from_f64(f64::from(params.self_arc)),
         }
     }
 
-    /// A beam's vector, in the reference and now.
+    /// The piece of the line of a beam.
     #[inline(always)]
-    fn vector(&self, beam: usize) -> (Vector<R>, Vector<R>) {
-        let (d, change) = beam2::vector::<_, PERIODIC>(self.beams, self.ends, beam, &self.displacement, self.gradient);
-        (d, add(d, change))
+    fn piece(&self, beam: usize) -> Piece<R> {
+        self.bows.piece::<PERIODIC>(self.beams, self.ends, beam, &self.displacement, self.gradient)
     }
 
-    /// From a beam's chord to its line, in the reference and now.
+    /// The pieces of beam `a`, which is known, and of `b` in an image, in the reference and now.
     #[inline(always)]
-    fn bow(&self, beam: usize) -> (Vector<R>, Vector<R>) {
-        self.bows.bow::<PERIODIC>(self.beams, self.ends, beam, &self.displacement, self.gradient)
-    }
-
-    /// From the line of beam `a`, which lies `bow` beside its chord, to that of `b` in an image, in the reference and now.
-    #[inline(always)]
-    fn between(&self, a: usize, bow: &(Vector<R>, Vector<R>), b: usize, image: [i32; 2]) -> (Vector<R>, Vector<R>) {
-        let other = self.bow(b);
+    fn segments(&self, a: usize, own: &Piece<R>, b: usize, image: [i32; 2]) -> [Segments<R>; 2] {
+        let other = self.piece(b);
         let (a, b) = (self.ends[2 * a] as usize, self.ends[2 * b] as usize);
         let rest: Vector<R> = self.reference.between(b, a, shift::<PERIODIC>(self.period, image));
         let affine = if PERIODIC { add(rest, apply(self.gradient, rest)) } else { rest };
         let now = add(affine, self.displacement.between(b, a));
-        (add(rest, sub(other.0, bow.0)), add(now, sub(other.1, bow.1)))
+        let between = |own: [Vector<R>; 2], apart, other: [Vector<R>; 2]| Segments {
+            along: sub(own[1], own[0]),
+            start: add(apart, sub(other[0], own[0])),
+            other: sub(other[1], other[0]),
+        };
+        [between(own.rest, rest, other.rest), between(own.now, now, other.now)]
+    }
+
+    /// Whether beam `a` takes the joint at the first end of `b` off: where it is a pair with the beam before `b` too.
+    #[inline(always)]
+    fn owns(&self, a: usize, b: usize, image: [i32; 2]) -> bool {
+        let before = self.bows.before(b, image);
+        before.is_some_and(|(before, image)| before > a && !self.bows.are_near(a, before, image, self.self_arc))
     }
 }
 
-/// Coordinates (0 to 1) of the closest points of segment `0 → d1` and segment `start → start + d2`.
-#[inline(always)]
-pub fn closest_points<R: Real>(d1: Vector<R>, d2: Vector<R>, start: Vector<R>) -> (R, R) {
-    let (zero, one) = (R::from_f64(0.0), R::from_f64(1.0));
-    let unit = |x: R| x.max(zero).min(one);
-    let (a, e, b) = (dot(d1, d1), dot(d2, d2), dot(d1, d2));
-    let (c, f) = (-dot(d1, start), -dot(d2, start));
-    let determinant = a * e - b * b;
-    let s = if determinant > a * e * R::from_f64(1e-6) {
-        unit((b * f - c * e) / determinant)
-    } else {
-        // parallel: the middle of the overlap
-        let (p, q) = (dot(d1, start) / a, dot(d1, add(start, d2)) / a);
-        let (low, high) = (p.min(q).max(zero), p.max(q).min(one));
-        unit(R::from_f64(0.5) * (low + high))
-    };
-    let t = (b * s + f) / e;
-    if t < zero {
-        (unit(-c / a), zero)
-    } else if t > one {
-        (unit((b - c) / a), one)
-    } else {
-        (s, t)
+/// What tells a beam which others are near.
+struct Search<'a, R, const PERIODIC: bool> {
+    scene: Scene<'a, R, PERIODIC>,
+    params: Params,
+    counts: &'a [u32],
+    lists: &'a [u32],
+    boxes: &'a [R],
+    inverse: [[R; 2]; 2],
+    reach: R,
+}
+
+/// Cells from the first to the last along x and y.
+type Cells = [(i32, i32); 2];
+
+impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
+    /// The cells of a beam's piece; `None` if it is nowhere.
+    #[inline(always)]
+    fn cells(&self, io: &Io<R>, beam: usize, piece: &Piece<R>) -> Option<Cells> {
+        let (node, _) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &self.inverse, self.scene.ends[2 * beam] as usize);
+        let ends = piece.now.map(|end| pull_back(&self.inverse, end));
+        // lines leave the boxes of their items by so much
+        let beside = R::from_f64(f64::from(self.params.beside));
+        let range = |k: usize| {
+            let room =
+                beside * (self.inverse[k][0] * self.inverse[k][0] + self.inverse[k][1] * self.inverse[k][1]).sqrt();
+            let (a, b) = (node[k] + ends[0][k], node[k] + ends[1][k]);
+            cells::<_, PERIODIC>(&self.params, k, a.min(b) - room, a.max(b) + room)
+        };
+        (node[0].is_finite() && node[1].is_finite()).then(|| [range(0), range(1)])
+    }
+
+    /// The items of a cell; more than it can hold if it is full.
+    #[inline(always)]
+    fn items(&self, x: i32, y: i32) -> Option<&[u32]> {
+        let cell = cell_index(&self.params, x, y);
+        let capacity = self.params.capacity as usize;
+        (self.counts[cell] <= self.params.capacity)
+            .then(|| &self.lists[cell * capacity..][..self.counts[cell] as usize])
+    }
+
+    /// Whether a beam of a higher number in these cells has moved relative to this one since everything was searched; `None` if a
+    /// cell is full.
+    #[inline(always)]
+    fn has_moved(&self, beam: usize, [xs, ys]: Cells) -> Option<bool> {
+        let item = self.params.slabs + beam as u32;
+        let own = &self.boxes[BOX * item as usize..][..BOX];
+        let (least, greatest) = ([0, 1, 2].map(|k| own[MOTION + k]), [0, 1, 2].map(|k| own[MOTION + 3 + k]));
+        let apart = R::from_i32(self.params.apart as i32);
+        let mut moved = false;
+        for y in ys.0..=ys.1 {
+            for x in xs.0..=xs.1 {
+                let near = self.items(x, y)?.iter().filter(|near| **near > item);
+                moved = moved
+                    || near
+                        .into_iter()
+                        .any(|near| has_moved(&self.boxes[BOX * *near as usize..][..BOX], least, greatest, apart));
+            }
+        }
+        Some(moved)
+    }
+
+    /// The image of an item that is nearest to a beam.
+    #[inline(always)]
+    fn image(&self, beam: usize, near: usize) -> [i32; 2] {
+        let item = self.params.slabs as usize + beam;
+        [0, 1].map(|k| {
+            if !PERIODIC || self.params.period[k] == 0 {
+                return 0;
+            }
+            let apart = self.boxes[BOX * item + k] - self.boxes[BOX * near + k];
+            (apart / (R::from_i32(self.params.period[k]) * R::from_f64(QUANTUM))).to_i32()
+        })
+    }
+
+    /// Whether a pair is within reach.
+    #[inline(always)]
+    fn is_near(&self, beam: usize, piece: &Piece<R>, other: usize, image: [i32; 2]) -> bool {
+        let [_, now] = self.scene.segments(beam, piece, other, image);
+        now.distance() < self.reach
+    }
+
+    /// Takes pairs that are out of reach off a beam's list; how many are left.
+    #[inline(always)]
+    fn keep(&self, beam: usize, piece: &Piece<R>, keys: &mut [u32], states: &mut [R]) -> usize {
+        let size = self.params.state as usize;
+        let mut count = 0;
+        for slot in 0..keys.len() {
+            let known = std::mem::replace(&mut keys[slot], EMPTY);
+            if known == EMPTY {
+                break;
+            }
+            let (other, image) = of_key(known);
+            if self.is_near(beam, piece, other, image) {
+                keys[count] = known;
+                states.copy_within(size * slot..size * (slot + 1), size * count);
+                count += 1;
+            }
+        }
+        count
+    }
+
+    /// Adds pairs within reach to a beam's list of `count`, in ascending order whatever that of the cells is; `false` if there is no room.
+    #[inline(always)]
+    fn fill(
+        &self,
+        beam: usize,
+        piece: &Piece<R>,
+        [xs, ys]: Cells,
+        keys: &mut [u32],
+        states: &mut [R],
+        mut count: usize,
+    ) -> bool {
+        let size = self.params.state as usize;
+        for y in ys.0..=ys.1 {
+            for x in xs.0..=xs.1 {
+                for &near in self.items(x, y).unwrap_or_default() {
+                    if near <= self.params.slabs + beam as u32 {
+                        continue;
+                    }
+                    let other = (near - self.params.slabs) as usize;
+                    let image = self.image(beam, near as usize);
+                    let key = key(other, image);
+                    let place = keys[..count].iter().take_while(|known| **known < key).count();
+                    let is_known = place < count && keys[place] == key;
+                    if is_known
+                        || self.scene.bows.are_near(beam, other, image, self.scene.self_arc)
+                        || !self.is_near(beam, piece, other, image)
+                    {
+                        continue;
+                    }
+                    if count == keys.len() {
+                        return false;
+                    }
+                    keys.copy_within(place..count, place + 1);
+                    states.copy_within(size * place..size * count, size * (place + 1));
+                    keys[place] = key;
+                    states[size * place..][..size].fill(R::from_f64(0.0));
+                    count += 1;
+                }
+            }
+        }
+        true
     }
 }
 
@@ -122,135 +254,281 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        // thread of each beam, and see `ARC`
-        const THREADS: usize = 7;
-        const ARCS: usize = 8;
-        const COUNTS: usize = 9;
-        const ITEMS: usize = 10;
-        const BOXES: usize = 11;
         let params: Params = io.params();
-        let constant = L::Scalar::from_f64;
-        let scene = Scene::<_, PERIODIC>::new(io, params.period);
-        let (threads, arcs) = (io.uints(THREADS), io.scalars(ARCS));
-        let (counts, lists) = (io.uints(COUNTS), io.uints(ITEMS));
-        let boxes = io.scalars(BOXES);
-        let mut keys = io.own::<u32>(12);
-        let mut states = io.own::<L::Scalar>(13);
-        let mut when = io.own::<u32>(14);
-        let flags = io.atomic_uints(15);
-        let apart = L::Scalar::from_i32(params.apart as i32);
-        let inverse = inverse::<_, PERIODIC>(&io.row.gradient);
-        let period = params.period.map(|p| L::Scalar::from_i32(p) * constant(QUANTUM));
-        let reach = constant(f64::from(2.0 * params.thread_radius + params.skin));
-        let slots = params.beam_slots as usize;
+        let search = Search::<_, PERIODIC> {
+            scene: Scene::new(io, &params),
+            params,
+            counts: io.uints(7),
+            lists: io.uints(8),
+            boxes: io.scalars(9),
+            inverse: inverse::<_, PERIODIC>(&io.row.gradient),
+            reach: L::Scalar::from_f64(f64::from(2.0 * params.thread_radius + params.skin)),
+        };
+        let mut keys = io.own::<u32>(10);
+        let mut states = io.own::<L::Scalar>(11);
+        let mut when = io.own::<u32>(12);
+        let flags = io.atomic_uints(13);
         for beam in items {
-            let middle = |item: usize, k: usize| boxes[BOX * item + k];
-            let (_, along) = scene.vector(beam);
-            let bow = scene.bow(beam);
-            let (node, _) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, scene.ends[2 * beam] as usize);
-            let (aside, back) = (pull_back(&inverse, bow.1), pull_back(&inverse, along));
-            let start = [node[0] + aside[0], node[1] + aside[1]];
-            let range = |k: usize| {
-                let end = start[k] + back[k];
-                cells::<_, PERIODIC>(&params, k, start[k].min(end), start[k].max(end))
-            };
-            let ((x0, x1), (y0, y1)) = (range(0), range(1));
-            if !(start[0].is_finite() && start[1].is_finite()) {
+            let piece = search.scene.piece(beam);
+            let Some(cells) = search.cells(io, beam, &piece) else {
                 flags[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
                 continue;
-            }
+            };
             let when = when.at(0, beam);
-            let own = &boxes[BOX * (params.slabs as usize + beam)..][..BOX];
-            let (least, greatest) = ([0, 1, 2].map(|k| own[MOTION + k]), [0, 1, 2].map(|k| own[MOTION + 3 + k]));
-            let (mut searches, mut full) = (*when != found::WITH_ALL, false);
-            for y in y0..=y1 {
-                for x in x0..=x1 {
-                    let cell = cell_index(&params, x, y);
-                    full |= counts[cell] > params.capacity;
-                    if searches || full {
-                        continue;
-                    }
-                    let items = &lists[cell * params.capacity as usize..][..counts[cell] as usize];
-                    searches = items
-                        .iter()
-                        .filter(|near| **near > params.slabs + beam as u32)
-                        .any(|near| has_moved(&boxes[BOX * *near as usize..][..BOX], least, greatest, apart));
-                }
-            }
             // overflow keeps what was known, and is searched again with larger tables
-            if !searches || full {
-                continue;
-            }
-            // in ascending order
-            let mut pairs = [EMPTY; MOST_PAIRS];
-            let mut count = 0;
-            for y in y0..=y1 {
-                for x in x0..=x1 {
-                    let cell = cell_index(&params, x, y);
-                    let listed = counts[cell] as usize;
-                    for &near in &lists[cell * params.capacity as usize..][..listed] {
-                        if near < params.slabs + beam as u32 + 1 {
-                            continue;
-                        }
-                        let other = (near - params.slabs) as usize;
-                        if threads[other] == threads[beam] {
-                            let (a, b) = (&arcs[ARC * beam..][..ARC], &arcs[ARC * other..][..ARC]);
-                            let direct = (a[0] - b[0]).abs();
-                            let around = if a[2] > constant(0.0) { direct.min(a[2] - direct) } else { direct };
-                            let between = around - constant(0.5) * (a[1] + b[1]);
-                            if between < constant(f64::from(params.self_arc)) {
-                                continue;
-                            }
-                        }
-                        let image_along = |k: usize| {
-                            if !PERIODIC || params.period[k] == 0 {
-                                return 0;
-                            }
-                            let apart = middle(params.slabs as usize + beam, k) - middle(near as usize, k);
-                            (apart / period[k]).to_i32()
-                        };
-                        let image = [image_along(0), image_along(1)];
-                        let (_, apart) = scene.between(beam, &bow, other, image);
-                        let (_, direction) = scene.vector(other);
-                        let (s, t) = closest_points(along, direction, apart);
-                        let offset = sub(scale(along, s), fma(direction, t, apart));
-                        if !(norm(offset) < reach) {
-                            continue;
-                        }
-                        let key = key(other, image);
-                        let place = pairs[..count].partition_point(|known| *known < key);
-                        if pairs[..count].get(place) == Some(&key) {
-                            continue;
-                        }
-                        if count == MOST_PAIRS {
-                            full = true;
-                            continue;
-                        }
-                        pairs.copy_within(place..count, place + 1);
-                        pairs[place] = key;
-                        count += 1;
-                    }
-                }
-            }
-            if full || count > slots {
-                flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
+            let Some(moved) = search.has_moved(beam, cells) else { continue };
+            if !moved && *when == found::WITH_ALL {
                 continue;
             }
             let (keys, states) = (keys.item(0, beam), states.item(0, beam));
-            let size = params.state as usize;
-            let mut old = [(EMPTY, [constant(0.0); MOST_STATE]); MOST_PAIRS];
-            for ((old, key), state) in old.iter_mut().zip(keys.iter()).zip(states.chunks_exact(size)) {
-                old.0 = *key;
-                old.1[..size].copy_from_slice(state);
-            }
-            for (slot, (key, state)) in keys.iter_mut().zip(states.chunks_exact_mut(size)).enumerate() {
-                *key = pairs[..count].get(slot).copied().unwrap_or(EMPTY);
-                let known = old.iter().find(|(old, _)| *key != EMPTY && old == key);
-                state.copy_from_slice(&known.map_or([constant(0.0); MOST_STATE], |(_, state)| *state)[..size]);
+            let count = search.keep(beam, &piece, keys, states);
+            if !search.fill(beam, &piece, cells, keys, states, count) {
+                flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
+                continue;
             }
             *when = if *when == found::NEVER { found::WITH_ALL } else { found::SINCE };
             flags[status::SEARCHED].fetch_add(1, Ordering::Relaxed);
         }
+    }
+}
+
+/// Two beams that touch: their nodes and weights, the penalty times their lengths, N/mm, and their pieces at rest.
+struct Pair<R> {
+    nodes: [[usize; 4]; 2],
+    weights: [[[R; 4]; 2]; 2],
+    strengths: [R; 2],
+    rest: Segments<R>,
+}
+
+impl<R: Real> Pair<R> {
+    /// Weights of the nodes at points of both pieces.
+    #[inline(always)]
+    fn at(&self, points: [R; 2]) -> [[R; 4]; 2] {
+        let one = R::from_f64(1.0);
+        [0, 1].map(|i| {
+            let ([first, second], s) = (self.weights[i], points[i]);
+            [0, 1, 2, 3].map(|n| first[n] * (one - s) + second[n] * s)
+        })
+    }
+
+    /// Adds forces on the ends of both pieces to their nodes, in integers whose sum is zero.
+    #[inline(always)]
+    fn add_forces(&self, forces: &[AtomicI32], status: &[AtomicU32], quantum: R, push: &Push<R>) {
+        let mut rest = [0i32; 3];
+        for (i, ends) in [push.own, push.others].into_iter().enumerate() {
+            for (n, node) in self.nodes[i].into_iter().enumerate() {
+                let force = fma(ends[0], self.weights[i][0][n], scale(ends[1], self.weights[i][1][n]));
+                let quanta = scale(force, R::from_f64(1.0) / quantum);
+                if !quanta.into_iter().all(|quanta| is_in_range(status, quanta, node)) {
+                    return;
+                }
+                let whole = if (i, n) == (1, 3) { rest } else { quanta.map(R::to_i32) };
+                rest = [0, 1, 2].map(|k| rest[k] - whole[k]);
+                add_force(forces, node, whole);
+            }
+        }
+    }
+
+    /// Adds bounds of the stiffness at the ends of both pieces, times the sum of the weights of both.
+    #[inline(always)]
+    fn add_rows(&self, stiffness: &[AtomicI32], quantum: R, push: &Push<R>, most_weights: R) {
+        for (i, rows) in [push.own_rows, push.other_rows].into_iter().enumerate() {
+            for (end, row) in rows.into_iter().enumerate() {
+                add_stiffness(
+                    stiffness,
+                    row * most_weights,
+                    quantum,
+                    self.nodes[i].into_iter().zip(self.weights[i][end]),
+                );
+            }
+        }
+    }
+}
+
+/// What pairs that touch read and write.
+struct Touch<'a, R, const FRICTION: bool, const PERIODIC: bool> {
+    scene: Scene<'a, R, PERIODIC>,
+    row: &'a Row<R>,
+    velocity: Field<'a, R>,
+    mass: &'a [R],
+    forces: &'a [AtomicI32],
+    stiffness: &'a [AtomicI32],
+    flags: &'a [AtomicU32],
+    params: Params,
+    /// Distance at which threads touch, mm, and its increment since the step before.
+    reach: R,
+    growth: R,
+    /// Time since the step before, s.
+    elapsed: R,
+}
+
+#[inline(always)]
+fn real<R: Real>(x: f32) -> R {
+    R::from_f64(f64::from(x))
+}
+
+impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICTION, PERIODIC> {
+    #[inline(always)]
+    fn new(io: &'a Io<R>) -> Self {
+        const VELOCITY: usize = 7;
+        const MASS: usize = 8;
+        let params: Params = io.params();
+        let thick = real::<R>(2.0 * params.thread_radius);
+        Self {
+            scene: Scene::new(io, &params),
+            row: io.row,
+            velocity: Field::new(io, VELOCITY),
+            mass: io.scalars(MASS),
+            forces: io.atomics(12),
+            stiffness: io.atomics(13),
+            flags: io.atomic_uints(14),
+            params,
+            reach: thick * io.row.radius,
+            growth: thick * io.row.radius_increment,
+            elapsed: io.row.dt_mid + io.row.dt_mid - io.row.dt,
+        }
+    }
+
+    /// Lets gaps close, and tells whether one of a beam's pairs can touch.
+    #[inline(always)]
+    fn can_touch(&self, beam: usize, keys: &[u32], states: &mut [R]) -> bool {
+        let zero = R::from_f64(0.0);
+        let weights = self.scene.bows.most_weights(beam);
+        let mut can_touch = false;
+        for (key, state) in keys.iter().zip(states.chunks_exact_mut(slot_state(FRICTION))) {
+            if state[0] < zero {
+                let mean = R::from_f64(0.5) * (weights + self.scene.bows.most_weights(of_key(*key).0));
+                state[0] = state[0] + self.row.approach * mean * self.elapsed + self.growth;
+            }
+            can_touch |= !(state[0] < zero);
+        }
+        can_touch
+    }
+
+    /// Length at rest of a beam, mm.
+    #[inline(always)]
+    fn length(&self, beam: usize) -> R {
+        self.scene.beams[TABLE * beam + 3]
+    }
+
+    /// Tangential stiffness of a beam's pairs, N/mm: that of a contact as long as the beam, or as a thread is thick.
+    #[inline(always)]
+    fn tangential(&self, beam: usize) -> R {
+        let thick = real::<R>(2.0 * self.params.thread_radius);
+        real::<R>(self.params.thread_thread) * self.length(beam).min(thick) * real(self.params.tangential)
+    }
+
+    /// Lets go of what friction holds.
+    #[inline(always)]
+    fn release(&self, beam: usize, state: &mut [R], sum: &mut [R]) {
+        if FRICTION {
+            let elastic = [state[1], state[2], state[3]];
+            sum[SUM_FRICTION] = sum[SUM_FRICTION] + R::from_f64(0.5) * self.tangential(beam) * dot(elastic, elastic);
+            state[1..].fill(R::from_f64(0.0));
+        }
+    }
+
+    /// Forces of a beam, whose piece is known, and another one; whether they touch.
+    #[inline(always)]
+    fn pair(&self, beam: usize, own: &Piece<R>, key: u32, state: &mut [R], sum: &mut [R]) -> bool {
+        let zero = R::from_f64(0.0);
+        let (other, image) = of_key(key);
+        let [rest, now] = self.scene.segments(beam, own, other, image);
+        let strengths = [beam, other].map(|beam| real::<R>(self.params.thread_thread) * self.length(beam));
+        let depth = self.reach - now.distance();
+        let push = || now.push(self.reach, strengths[0], self.scene.owns(beam, other, image));
+        let push = if depth > zero { Some(push()) } else { None };
+        let Some(mut push) = push.filter(|push| push.weight > zero) else {
+            self.release(beam, state, sum);
+            state[0] = depth.min(zero);
+            return false;
+        };
+        sum[SUM_ENERGY] = sum[SUM_ENERGY] + push.energy;
+        sum[SUM_RADIUS] = sum[SUM_RADIUS] + push.growth * self.growth;
+        let bows = &self.scene.bows;
+        let pair = Pair {
+            nodes: [beam, other].map(|beam| bows.nodes(self.scene.ends, beam)),
+            weights: [beam, other].map(|beam| bows.weights(beam)),
+            strengths,
+            rest,
+        };
+        let pressed = norm(push.total());
+        if pressed > zero {
+            let tangential = if FRICTION { self.tangential(beam) } else { zero };
+            self.resist(&pair, pressed, tangential, &mut push, state, sum);
+        } else {
+            self.release(beam, state, sum);
+        }
+        state[0] = pressed;
+        if PERIODIC {
+            let sum = &mut sum[const { virial(FRICTION) }..];
+            add_virial(sum, push.own[1], pair.rest.along);
+            add_virial(sum, push.others[0], pair.rest.start);
+            add_virial(sum, push.others[1], add(pair.rest.start, pair.rest.other));
+        }
+        pair.add_forces(self.forces, self.flags, real(self.params.force_quantum), &push);
+        let most_weights = bows.most_weights(beam) + bows.most_weights(other);
+        pair.add_rows(self.stiffness, real(self.params.stiffness_quantum), &push, most_weights);
+        raise(&self.flags[status::PENETRATION[2]], depth);
+        true
+    }
+
+    /// Adds damping, and friction of a stiffness `tangential` (N/mm), to an elastic force of size `pressed` (N), at the point where it acts.
+    ///
+    /// Damping is a share of what is critical for the lengths that touch, with the penalty and their own mass: as much a length of contact
+    /// in any mesh, and sure not to turn the velocity. A node has half of its mass on either side.
+    ///
+    /// Damping asks for the velocity in the middle of a step, and knows that of half a step before. It lies between that one, as where other
+    /// forces hold the contact in balance, and the one after half a step of the elastic force alone, as where bodies fly freely. The smaller
+    /// of both is taken, and none if they differ in sign, so that no contact gains energy however few steps it lasts. What is lost is
+    /// noted with the mean of both.
+    #[inline(always)]
+    fn resist(&self, pair: &Pair<R>, pressed: R, tangential: R, push: &mut Push<R>, state: &mut [R], sum: &mut [R]) {
+        let (zero, one, half) = (R::from_f64(0.0), R::from_f64(1.0), R::from_f64(0.5));
+        let [s, t] = push.at.map(|moment| moment / push.weight);
+        let normal = scale(push.total(), one / pressed);
+        let mut motion = [zero; 3];
+        let mut square = zero;
+        for (i, weights) in pair.at([s, t]).into_iter().enumerate() {
+            for (node, weight) in pair.nodes[i].into_iter().zip(weights) {
+                motion = fma(self.velocity.at(node), if i == 0 { weight } else { -weight }, motion);
+                square = square + (pair.strengths[i] + pair.strengths[i]) * weight * weight / self.mass[node];
+            }
+        }
+        if PERIODIC {
+            let between = sub(scale(pair.rest.along, s), fma(pair.rest.other, t, pair.rest.start));
+            motion = add(motion, apply(&self.row.rate, between));
+        }
+        let frequency = square.sqrt();
+        let stiffness = push.stiffness.max(pair.strengths[0] * R::from_f64(LEAST));
+        let half_step = half * self.row.dt_mid * square / stiffness;
+        let approach = dot(motion, normal);
+        let free = approach + half_step * pressed;
+        let mean = if approach > zero { approach } else { free.min(zero) };
+        let damping = real::<R>(self.params.damping);
+        let viscosity = R::from_f64(2.0) * damping * stiffness / frequency;
+        let held = viscosity / (one + damping * frequency * self.row.dt_mid);
+        let normal_force = (pressed - held * mean).max(zero);
+        let drag = pressed - normal_force;
+        let between = half * (approach + free) - half_step * drag;
+        sum[SUM_DAMPING] = sum[SUM_DAMPING] + drag * between * self.row.dt_mid;
+        let mut force = scale(normal, -drag);
+        let mut row = held * (R::from_f64(2.0) / self.row.dt);
+        if FRICTION {
+            let elastic = [state[1], state[2], state[3]];
+            let limit = real::<R>(self.params.friction) * normal_force;
+            let slid = slide(elastic, scale(motion, self.elapsed), normal, tangential, limit);
+            sum[SUM_FRICTION] = sum[SUM_FRICTION] + slid.dissipated;
+            sum[SUM_SLIP] = sum[SUM_SLIP] + slid.slip;
+            sum[SUM_ENERGY] = sum[SUM_ENERGY] + half * tangential * dot(slid.elastic, slid.elastic);
+            state[1..].copy_from_slice(&slid.elastic);
+            force = sub(force, scale(slid.elastic, tangential));
+            row = row + (tangential - push.stiffness).max(zero);
+        }
+        push.own = [fma(force, one - s, push.own[0]), fma(force, s, push.own[1])];
+        push.others = [fma(force, t - one, push.others[0]), fma(force, -t, push.others[1])];
+        push.own_rows = [push.own_rows[0] + row * (one - s), push.own_rows[1] + row * s];
+        push.other_rows = [push.other_rows[0] + row * (one - t), push.other_rows[1] + row * t];
     }
 }
 
@@ -263,23 +541,11 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        const VELOCITY: usize = 7;
-        const MASS: usize = 8;
-        let (state_size, virial) = const { (slot_state(FRICTION), virial(FRICTION)) };
-        let params: Params = io.params();
-        let real = |x: f32| L::Scalar::from_f64(f64::from(x));
-        let constant = L::Scalar::from_f64;
-        let (zero, one) = (constant(0.0), constant(1.0));
-        let scene = Scene::<_, PERIODIC>::new(io, params.period);
-        let velocity = Field::new(io, VELOCITY);
-        let mass = io.scalars(MASS);
+        let zero = L::Scalar::from_f64(0.0);
+        let touch = Touch::<_, FRICTION, PERIODIC>::new(io);
         let mut keys = io.own::<u32>(9);
         let mut states = io.own::<L::Scalar>(10);
         let mut sums = io.own::<L::Scalar>(11);
-        let (forces, stiffness, flags) = (io.atomics(12), io.atomics(13), io.atomic_uints(14));
-        let radius = real(params.thread_radius) * io.row.radius;
-        let growth = constant(2.0) * real(params.thread_radius) * io.row.radius_increment;
-        let elapsed = io.row.dt_mid + io.row.dt_mid - io.row.dt;
         for beam in items {
             let slot_keys = keys.item(0, beam);
             if slot_keys[0] == EMPTY {
@@ -288,93 +554,19 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
             let slot_states = states.item(0, beam);
             let sum = sums.item(0, beam);
             let count = slot_keys.iter().position(|key| *key == EMPTY).unwrap_or(slot_keys.len());
-            let weights = scene.bows.line_weights(beam);
-            let mean_weights = |other| constant(0.5) * (weights + scene.bows.line_weights(other));
-            let mut can_touch = false;
-            for (key, state) in slot_keys[..count].iter().zip(slot_states.chunks_exact_mut(state_size)) {
-                if state[0] < zero {
-                    state[0] = state[0] + io.row.approach * mean_weights(of_key(*key).0) * elapsed + growth;
-                }
-                can_touch |= !(state[0] < zero);
-            }
             sum[SUM_ENERGY] = zero;
-            if !can_touch {
+            if !touch.can_touch(beam, &slot_keys[..count], slot_states) {
                 continue;
             }
-            let mut energy = zero;
+            let own = touch.scene.piece(beam);
             let mut touches = false;
-            let (rest, along) = scene.vector(beam);
-            let bow = scene.bow(beam);
-            for (key, state) in slot_keys[..count].iter().zip(slot_states.chunks_exact_mut(state_size)) {
-                if state[0] < zero {
-                    continue;
+            for (key, state) in slot_keys[..count].iter().zip(slot_states.chunks_exact_mut(slot_state(FRICTION))) {
+                if !(state[0] < zero) {
+                    touches |= touch.pair(beam, &own, *key, state, sum);
                 }
-                let (other, image) = of_key(*key);
-                let (apart_rest, apart) = scene.between(beam, &bow, other, image);
-                let (direction_rest, direction) = scene.vector(other);
-                let (s, t) = closest_points(along, direction, apart);
-                let offset = sub(scale(along, s), fma(direction, t, apart));
-                let distance = norm(offset);
-                let depth = radius + radius - distance;
-                let penalty = real(params.thread_thread);
-                let tangential = penalty * real(params.tangential);
-                if depth <= zero || distance < constant(1e-6) {
-                    if FRICTION {
-                        let elastic = [state[1], state[2], state[3]];
-                        sum[SUM_FRICTION] = sum[SUM_FRICTION] + constant(0.5) * tangential * dot(elastic, elastic);
-                    }
-                    state.fill(zero);
-                    state[0] = depth.min(zero);
-                    continue;
-                }
-                touches = true;
-                let normal = scale(offset, one / distance);
-                let nodes = scene.bows.line_nodes(scene.ends, beam, s);
-                let others = scene.bows.line_nodes(scene.ends, other, t);
-                let mut motion = [zero; 3];
-                let mut inverse = zero;
-                for (node, weight) in nodes {
-                    motion = fma(velocity.at(node), weight, motion);
-                    inverse = inverse + weight * weight / mass[node];
-                }
-                for (node, weight) in others {
-                    motion = fma(velocity.at(node), -weight, motion);
-                    inverse = inverse + weight * weight / mass[node];
-                }
-                let between = sub(scale(rest, s), fma(direction_rest, t, apart_rest));
-                if PERIODIC {
-                    motion = add(motion, apply(&io.row.rate, between));
-                }
-                let approach = dot(motion, normal);
-                let Press { elastic_force, pressing: normal_force, row_sum } =
-                    press(&params, io.row, penalty, depth, inverse, approach);
-                sum[SUM_DAMPING] = sum[SUM_DAMPING] + (elastic_force - normal_force) * approach * elapsed;
-                sum[SUM_RADIUS] = sum[SUM_RADIUS] + elastic_force * growth;
-                state[0] = normal_force;
-                let mut stored = elastic_force * depth;
-                let mut force = scale(normal, normal_force);
-                if FRICTION {
-                    let elastic = [state[1], state[2], state[3]];
-                    let limit = real(params.friction) * normal_force;
-                    let slid = slide(elastic, scale(motion, elapsed), normal, tangential, limit);
-                    sum[SUM_FRICTION] = sum[SUM_FRICTION] + slid.dissipated;
-                    sum[SUM_SLIP] = sum[SUM_SLIP] + slid.slip;
-                    state[1..].copy_from_slice(&slid.elastic);
-                    stored = stored + tangential * dot(slid.elastic, slid.elastic);
-                    force = sub(force, scale(slid.elastic, tangential));
-                }
-                energy = energy + constant(0.5) * stored;
-                if PERIODIC {
-                    add_virial(&mut sum[virial..], force, between);
-                }
-                add_pair(forces, flags, force, real(params.force_quantum), nodes, others);
-                let row_sum = row_sum * mean_weights(other);
-                add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes.into_iter().chain(others));
-                raise(&flags[status::PENETRATION[2]], depth);
             }
-            sum[SUM_ENERGY] = energy;
             if touches {
-                flags[status::TOUCHING[2]].fetch_add(1, Ordering::Relaxed);
+                touch.flags[status::TOUCHING[2]].fetch_add(1, Ordering::Relaxed);
             }
         }
     }

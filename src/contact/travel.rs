@@ -3,7 +3,7 @@
 //!
 //! There is one as soon as a node has travelled by [`SKIN_USED`] of the contact skin. It searches again only where bodies have moved
 //! relative to each other: since the last search of everything, all nodes have noted where they were then, and candidates
-//! from then are good as long as nothing in reach has moved by more than [`SKIN_APART`] relative to the slave. What is carried
+//! from then are good as long as nothing in reach has moved by more than [`SKIN_APART`] relative to its carrier. What is carried
 //! along with its surroundings, as by the clamp of a specimen, is not searched. One that was searched since then is searched at
 //! every look, until enough are for a search of everything to pay.
 //!

@@ -122,7 +122,7 @@ pub fn contact(case: &Case, fabric: &Fabric, mesh: &Mesh) -> Result<()> {
         }
     }
     if contact.thread_thread
-        && let Some(start) = clearance::thread_thread(mesh, contact.self_contact_arc_mm)
+        && let Some(start) = clearance::thread_thread(mesh, mesh.self_arc())
         && start.gap < deepest(2.0 * radius)
     {
         let advice = "raise fabric.stitch.clearance_thread_mm or resolution.beams_per_lap";

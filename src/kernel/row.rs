@@ -29,7 +29,7 @@ pub struct Row<R> {
     pub damping_thread: R,
     /// Acceleration of the amplitude of prescribed motion, 1/s².
     pub motion: R,
-    /// Bound on how fast two near bodies can approach each other, mm/s; beyond all speeds before the first step.
+    /// Bound on how fast two near bodies can approach each other, mm/s.
     pub approach: R,
 }
 

@@ -125,6 +125,12 @@ impl Mesh {
         [x + f64::from(seen.image[0]) * lx, y + f64::from(seen.image[1]) * ly, z]
     }
 
+    /// Arc, mm, within which points of one thread do not touch each other: half a turn of the tightest loop that a thread can make,
+    /// with its radius, whose inside folds. Points further apart have room for both radii in any wider bend.
+    pub fn self_arc(&self) -> f64 {
+        std::f64::consts::PI * self.threads.iter().map(|t| t.radius).fold(0.0, f64::max)
+    }
+
     /// Number of hexahedra.
     pub fn hexes(&self) -> usize {
         self.blocks.iter().map(Block::hexes).sum()

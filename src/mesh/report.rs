@@ -39,7 +39,6 @@ pub struct Report {
 pub fn report(mesh: &Mesh, case: &Case) -> Report {
     let count = |ply: Ply| mesh.blocks.iter().filter(|b| b.ply == ply).count();
     let total = |part: Option<Part>| mesh.threads.iter().map(|t| length(mesh, t, part)).sum();
-    let arc = case.effects.contact.clone().unwrap_or_default().self_contact_arc_mm;
     let links = linking::links(mesh);
     Report {
         title: case.title.clone(),
@@ -62,7 +61,7 @@ pub fn report(mesh: &Mesh, case: &Case) -> Report {
         clearances: [
             thread_yarn(mesh, Ply::Warp, SAMPLES),
             thread_yarn(mesh, Ply::Weft, SAMPLES),
-            thread_thread(mesh, arc),
+            thread_thread(mesh, mesh.self_arc()),
         ],
         held: links.iter().filter(|l| l.holds()).count(),
     }

@@ -1,8 +1,9 @@
-//! The outer surface of a block along its fibres: a ring of fibre lines around the section, and quadrilaterals between
-//! neighbouring lines and slices. The end caps of an open block are not part of it.
+//! The outer surface of a block: along its fibres a ring of fibre lines around the section, with quadrilaterals between
+//! neighbouring lines and slices; of an open block also the caps at both ends. So the surface is closed, or goes on for ever.
 
 use super::vector::{add, cross, norm, scale, sub};
 use super::{Block, Mesh, Seen};
+use std::collections::BTreeSet;
 
 /// The structured surface of a block. Faces and nodes have a place around the ring, counter-clockwise seen against ξ from
 /// the corner at column 0 and layer 0, and a place along the slices.
@@ -21,7 +22,7 @@ impl<'a> Surface<'a> {
         2 * (self.block.columns + self.block.layers)
     }
 
-    /// Number of faces.
+    /// Number of faces along the fibres.
     pub fn faces(&self) -> usize {
         self.ring() * self.block.slices
     }
@@ -73,7 +74,26 @@ impl<'a> Surface<'a> {
         [self.node(r, slice), self.node(next, slice), self.node(next, slice + 1), self.node(r, slice + 1)]
     }
 
-    /// Share of the surface that belongs to each node in mm², lines around the ring first, stations fastest: the integral
+    /// Corners of the faces that close an open block at both ends, counter-clockwise seen from outside; none of a closed one.
+    pub fn caps(&self) -> Vec<[Seen; 4]> {
+        if self.block.wrap.is_some() {
+            return Vec::new();
+        }
+        let Block { slices, columns, layers, .. } = *self.block;
+        let places = (0..layers).flat_map(|l| (0..columns).map(move |c| (c, l)));
+        let first = |(c, l)| [[c, l], [c, l + 1], [c + 1, l + 1], [c + 1, l]].map(|[c, l]| self.block.node(0, c, l));
+        let last =
+            |(c, l)| [[c, l], [c + 1, l], [c + 1, l + 1], [c, l + 1]].map(|[c, l]| self.block.node(slices, c, l));
+        places.clone().map(first).chain(places.map(last)).collect()
+    }
+
+    /// Corners of all faces: slice by slice around the ring, then the caps.
+    pub fn closed(&self) -> Vec<[Seen; 4]> {
+        let along = (0..self.block.slices).flat_map(|slice| (0..self.ring()).map(move |r| self.face(r, slice)));
+        along.chain(self.caps()).collect()
+    }
+
+    /// Share of the surface along the fibres that belongs to each node in mm², lines around the ring first, stations fastest: the integral
     /// of the bilinear shape functions (2 × 2 points).
     pub fn tributary_areas(&self, mesh: &Mesh) -> Vec<f64> {
         let stations = self.block.stations();
@@ -90,6 +110,23 @@ impl<'a> Surface<'a> {
         }
         areas
     }
+}
+
+/// Which of its edges (from a corner to the next one) and of its corners each face of a closed surface owns, such that every one
+/// is owned once: by the first face that has it.
+pub fn owned(faces: &[[Seen; 4]]) -> Vec<[[bool; 4]; 2]> {
+    let (mut edges, mut corners) = (BTreeSet::new(), BTreeSet::new());
+    let owned = faces.iter().map(|face| {
+        let edge = |a: usize| {
+            let ends = [face[a], face[(a + 1) % 4]];
+            let apart = |from: Seen, to: Seen| [to.image[0] - from.image[0], to.image[1] - from.image[1]];
+            let [there, back] = [(ends[0], ends[1]), (ends[1], ends[0])].map(|(a, b)| (a.node, b.node, apart(a, b)));
+            there.min(back)
+        };
+        let edges = [0, 1, 2, 3].map(|a| edges.insert(edge(a)));
+        [edges, face.map(|corner| corners.insert(corner.node))]
+    });
+    owned.collect()
 }
 
 /// Integral of each corner's bilinear shape function over a quadrilateral.
@@ -142,6 +179,35 @@ mod tests {
             let inside = (0..=columns).flat_map(|c| (0..=layers).map(move |l| (c, l)));
             let inside = inside.filter(|&(c, l)| surface.place(c, l).is_none()).count();
             assert_eq!(inside, (columns - 1) * (layers - 1));
+        }
+    }
+
+    /// Faces less edges plus corners.
+    fn euler(block: &Block) -> i64 {
+        let faces = Surface::new(block).closed();
+        let count = |owned: [bool; 4]| owned.iter().filter(|is_owned| **is_owned).count() as i64;
+        let owned = owned(&faces);
+        faces.len() as i64 + owned.iter().map(|[edges, corners]| count(*corners) - count(*edges)).sum::<i64>()
+    }
+
+    #[test]
+    fn surfaces_are_closed_and_every_edge_and_corner_is_owned_once() {
+        for (columns, layers) in [(1, 1), (4, 2), (3, 3)] {
+            let open = block(columns, layers);
+            assert_eq!(euler(&open), 2, "a ball");
+            for slices in [1, 2, 5] {
+                assert_eq!(
+                    euler(&Block { slices, wrap: Some([0, 1]), ..block(columns, layers) }),
+                    0,
+                    "a tube in a ring"
+                );
+            }
+            // every edge is in two faces, in opposite directions
+            let faces = Surface::new(&open).closed();
+            let edges = faces.iter().flat_map(|face| (0..4).map(|a| (face[a].node, face[(a + 1) % 4].node)));
+            let mut balance = std::collections::BTreeMap::new();
+            edges.for_each(|(a, b)| *balance.entry((a.min(b), a.max(b))).or_insert(0) += if a < b { 3 } else { 5 });
+            assert!(balance.values().all(|sum| *sum == 8));
         }
     }
 

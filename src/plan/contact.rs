@@ -2,22 +2,40 @@
 
 use super::conditions::Conditions;
 use super::effects::Active;
-use super::surfaces::Surfaces;
+use super::surfaces::{Carried, Surfaces};
 use super::threads::Threads;
 use super::ties::Ties;
-use super::{Builder, Capacity, Slave, after, beside, coded, own, thickness, waiting};
+use super::{Builder, Capacity, ContactPoint, after, beside, coded, own, thickness, waiting};
 use crate::case::effects::Contact;
 use crate::contact::found::NEVER;
 use crate::contact::travel::SKIN_APART;
 use crate::contact::{EMPTY, Params, candidates, grid, penalty, slot_state, threads, tie};
+use crate::elements::beam2;
+use crate::error::Result;
 use crate::kernel::buffer::{Buffer, Initial, Kind};
 use crate::kernel::position::quanta;
 use crate::kernel::stage::{Access, Code, Stage, flagged};
 use crate::mesh::Mesh;
 
-/// Buffers of one kind of contact that the host reads.
+/// Buffers of contact with the faces of yarns.
+#[derive(Debug, Clone, Copy)]
+pub struct FaceBuffers {
+    pub sums: Buffer,
+    /// See [`candidates::CARRIER`].
+    pub carriers: Buffer,
+    /// List of near faces of each carrier, see [`crate::contact::face::entry`], and gap counters of each point.
+    pub near: Buffer,
+    pub gaps: Buffer,
+    /// Bodies that each point touches, and [`penalty::touch`] of each.
+    pub keys: Buffer,
+    pub touches: Buffer,
+    /// See [`crate::contact::found`].
+    pub found: Buffer,
+}
+
+/// Buffers of contact between beams.
 #[derive(Clone, Copy)]
-pub(super) struct ContactBuffers {
+pub(super) struct PairBuffers {
     pub sums: Buffer,
     pub keys: Buffer,
     pub state: Buffer,
@@ -30,11 +48,12 @@ pub(super) struct ContactParts {
     pub params: Params,
     pub force: Buffer,
     pub stiffness: Buffer,
-    pub faces: Option<ContactBuffers>,
-    pub pairs: Option<ContactBuffers>,
+    /// Of threads and of yarns on yarns.
+    pub faces: [Option<FaceBuffers>; 2],
+    pub pairs: Option<PairBuffers>,
     /// Energies of ties, and how many there are.
     pub ties: Option<(Buffer, usize)>,
-    pub slaves: Vec<Slave>,
+    pub points: [Vec<ContactPoint>; 2],
 }
 
 /// What contact needs to know of the scene.
@@ -59,6 +78,49 @@ pub(super) struct ContactScene<'a> {
     pub beams: Buffer,
 }
 
+/// Names of the buffers and stages of a kind of contact with faces.
+struct Names {
+    carriers: &'static str,
+    nodes: &'static str,
+    points: &'static str,
+    near: &'static str,
+    gaps: &'static str,
+    keys: &'static str,
+    touches: &'static str,
+    found: &'static str,
+    sums: &'static str,
+    search: &'static str,
+    step: &'static str,
+}
+
+const OF_THREADS: Names = Names {
+    carriers: "carriers of thread points",
+    nodes: "nodes of thread points",
+    points: "thread points",
+    near: "faces near threads",
+    gaps: "gaps of thread points",
+    keys: "bodies that thread points touch",
+    touches: "touches of thread points",
+    found: "when faces near threads were found",
+    sums: "thread contact sums",
+    search: "thread-yarn candidates",
+    step: "thread-yarn contact",
+};
+
+const OF_YARNS: Names = Names {
+    carriers: "carriers of yarn points",
+    nodes: "nodes of yarn points",
+    points: "yarn points",
+    near: "faces near yarns",
+    gaps: "gaps of yarn points",
+    keys: "bodies that yarn points touch",
+    touches: "touches of yarn points",
+    found: "when faces near yarns were found",
+    sums: "yarn contact sums",
+    search: "yarn-yarn candidates",
+    step: "yarn-yarn contact",
+};
+
 /// Where bodies near each other are found.
 struct Search {
     counts: Buffer,
@@ -66,26 +128,26 @@ struct Search {
     boxes: Buffer,
 }
 
-/// Tables of bodies with faces.
+/// Tables of faces.
+#[derive(Clone, Copy)]
 struct Faces {
     slabs: Buffer,
-    bodies: Buffer,
-    rings: Buffer,
+    faces: Buffer,
 }
 
 impl ContactScene<'_> {
     /// Adds the stages of the pairs that can touch, and of ties.
-    pub fn add(&self, b: &mut Builder) -> ContactParts {
-        let surfaces = Surfaces::new(self.mesh, self.threads, self.chosen, self.active);
+    pub fn add(&self, b: &mut Builder) -> Result<ContactParts> {
+        let surfaces = Surfaces::new(self.mesh, self.threads, self.chosen, self.active)?;
         let nodes = self.mesh.nodes.len();
         let slabs = surfaces.slabs.len() / grid::SLAB;
         let params = self.params(&surfaces, slabs);
         let force = b.add("contact force", Kind::Int, 3 * nodes, false, Initial::Zero);
         let stiffness = b.add("contact stiffness", Kind::Int, nodes, false, Initial::Zero);
         let sums = (force, stiffness);
-        let (mut faces, mut pairs) = (None, None);
+        let (mut faces, mut pairs) = ([None; 2], None);
         if self.active.searches() {
-            let paired = if self.active.thread_thread { self.threads.thread.len() } else { 0 };
+            let paired = if self.active.thread_thread { self.threads.beams() } else { 0 };
             let cells = (params.cells[0] * params.cells[1]) as usize;
             let counts = b.add("items of cells", Kind::Uint, cells, false, Initial::Zero);
             let lists = b.add("cells", Kind::Uint, cells * self.capacity.cell, false, Initial::Zero);
@@ -100,17 +162,18 @@ impl ContactScene<'_> {
             if let Some(bows) = bows {
                 self.beams_to_grid(b, &search, slabs, bows, params);
             }
-            faces = tables.map(|tables| self.faces(b, &search, &tables, &surfaces, sums, params));
+            let mut waits = true;
+            for (kind, carried) in surfaces.carried.iter().enumerate().filter(|(_, carried)| !carried.points.is_empty())
+            {
+                faces[kind] =
+                    tables.map(|tables| self.faces(b, &search, tables, (kind == 0, carried), sums, (params, waits)));
+                waits = false;
+            }
             pairs = bows.map(|bows| self.pairs(b, &search, bows, sums, params));
         }
         let ties = self.active.ties.then(|| self.tied(b, sums, params));
-        let slaves = surfaces
-            .slaves
-            .chunks_exact(penalty::SLAVE)
-            .zip(&surfaces.measure)
-            .map(|(s, measure)| Slave { node: s[0] as usize, measure: *measure, is_thread: s[1] == EMPTY })
-            .collect();
-        ContactParts { params, force, stiffness, faces, pairs, ties, slaves }
+        let points = surfaces.carried.map(|carried| carried.contact_points);
+        Ok(ContactParts { params, force, stiffness, faces, pairs, ties, points })
     }
 
     /// Buffers of positions.
@@ -130,21 +193,20 @@ impl ContactScene<'_> {
 
     /// Yarns in the grid.
     fn slabs(&self, b: &mut Builder, search: &Search, surfaces: &Surfaces, params: Params) -> Faces {
-        let bodies = b.indices("bodies", bytemuck::cast_slice(&surfaces.bodies).to_vec());
-        let rings = b.indices("ring lines", surfaces.ring_lines.clone());
+        let faces = b.indices("faces", surfaces.faces.clone());
         let slabs = b.indices("slabs", surfaces.slabs.clone());
-        let mut reads = [&self.place()[..], &[slabs, bodies, rings]].concat();
+        let mut reads = [&self.place()[..], &[slabs, faces]].concat();
         reads.extend(self.before);
         let kernel = flagged!(grid::FillSlabs; self.active.periodic);
         let count = surfaces.slabs.len() / grid::SLAB;
         let stage = coded(kernel, "yarns to grid", count, 32, &reads, &self.to_grid(search), params);
         b.plan.search.push(waiting(stage));
-        Faces { slabs, bodies, rings }
+        Faces { slabs, faces }
     }
 
     /// Threads in the grid, behind the slabs of yarns.
     fn beams_to_grid(&self, b: &mut Builder, search: &Search, slabs: usize, bows: [Buffer; 2], params: Params) {
-        let beams = self.threads.thread.len();
+        let beams = self.threads.beams();
         let mut reads = [&self.place()[..], &[self.ends, self.beams], &bows].concat();
         reads.extend(self.before);
         let kernel = flagged!(grid::FillBeams; self.active.periodic);
@@ -153,61 +215,58 @@ impl ContactScene<'_> {
         b.plan.search.push(Stage { first: slabs, waits: slabs == 0, ..stage });
     }
 
-    /// Nodes of yarn surfaces and of threads against yarns, stages by kind.
+    /// Points of threads, or nodes of yarn surfaces, against yarns. What searches first waits for the grid.
     fn faces(
         &self,
         b: &mut Builder,
         search: &Search,
-        tables: &Faces,
-        surfaces: &Surfaces,
+        tables: Faces,
+        (thread, carried): (bool, &Carried),
         (force, stiffness): (Buffer, Buffer),
-        params: Params,
-    ) -> ContactBuffers {
-        let (count, slots, size) = (surfaces.count(), self.capacity.slots, params.state as usize);
+        (params, waits): (Params, bool),
+    ) -> FaceBuffers {
         let Active { friction, periodic, .. } = self.active;
-        let slaves = b.indices("slaves", surfaces.slaves.clone());
-        let values = b.table("slave values", surfaces.values.clone());
-        let keys_len = penalty::SLOT_KEYS * slots * count;
-        let keys = b.add("contact candidates", Kind::Uint, keys_len, true, Initial::Uint(vec![EMPTY; keys_len]));
-        let state = b.add("contact state", Kind::Scalar, size * slots * count, true, Initial::Zero);
-        let sums = b.scratch("contact sums", penalty::sums(friction, periodic) * count);
-        let keys_own = (keys, own(1, penalty::SLOT_KEYS * slots));
-        let state_own = (state, own(1, size * slots));
-        let mut near = [
-            &[slaves, values, tables.slabs, tables.bodies, tables.rings][..],
+        let Capacity { faces, slots, .. } = self.capacity;
+        let (count, lists) = (carried.contact_points.len(), carried.carriers.len() / candidates::CARRIER);
+        let names = if thread { &OF_THREADS } else { &OF_YARNS };
+        let carriers = b.indices(names.carriers, carried.carriers.clone());
+        let nodes = b.indices(names.nodes, carried.nodes.clone());
+        let points = b.table(names.points, carried.points.clone());
+        let (list, row) = (penalty::MADE + faces, penalty::GAPS + faces);
+        let (places, size) = (penalty::MADE + slots, penalty::touch(friction));
+        let empty = |len: usize| Initial::Uint(vec![EMPTY; len]);
+        let near = b.add(names.near, Kind::Uint, list * lists, true, empty(list * lists));
+        let gaps = b.add(names.gaps, Kind::Scalar, row * count, true, Initial::Zero);
+        let keys = b.add(names.keys, Kind::Uint, places * count, true, empty(places * count));
+        let touches = b.add(names.touches, Kind::Scalar, size * slots * count, true, Initial::Zero);
+        let found = b.add(names.found, Kind::Uint, lists, true, Initial::Uint(vec![NEVER; lists]));
+        let sums = b.scratch(names.sums, penalty::sums(friction, periodic) * count);
+
+        let mut reads = [
+            &[carriers, nodes, points, tables.slabs, tables.faces][..],
             &self.place(),
             &[search.counts, search.lists, search.boxes],
         ]
         .concat();
-        near.extend(self.before);
-        let found = b.add("when candidates were found", Kind::Uint, count, true, Initial::Uint(vec![NEVER; count]));
-        let searched = [keys_own, state_own, (found, own(1, 1)), self.status()];
-        let touched =
-            [&[slaves, values, tables.bodies, tables.rings][..], &self.place(), &[self.velocity, self.mass]].concat();
-        let pushed = [
-            keys_own,
-            state_own,
+        reads.extend(self.before);
+        let writes = [(near, own(1, list)), (found, own(1, 1)), self.status()];
+        let kernel = flagged!(candidates::Candidates; thread, periodic);
+        let stage = coded(kernel, names.search, lists, 64, &reads, &writes, params);
+        b.plan.search.push(Stage { waits, ..stage });
+
+        let reads = [&[nodes, points, tables.faces, near][..], &self.place(), &[self.velocity, self.mass]].concat();
+        let writes = [
+            (gaps, own(1, row)),
+            (keys, own(1, places)),
+            (touches, own(1, size * slots)),
             (sums, own(1, penalty::sums(friction, periodic))),
             (force, Access::Atomic),
             (stiffness, Access::Atomic),
             self.status(),
         ];
-        let yarns = surfaces.slaves.chunks_exact(penalty::SLAVE).filter(|slave| slave[1] != EMPTY).count();
-        let kinds = [
-            (false, 0..yarns, "yarn-yarn candidates", "yarn-yarn contact"),
-            (true, yarns..count, "thread-yarn candidates", "thread-yarn contact"),
-        ];
-        let mut waits = true;
-        for (thread, items, search_name, name) in kinds.into_iter().filter(|kind| !kind.1.is_empty()) {
-            let kernel = flagged!(candidates::Candidates; thread, periodic);
-            let stage = coded(kernel, search_name, items.len(), 64, &near, &searched, params);
-            b.plan.search.push(Stage { first: items.start, waits, ..stage });
-            let kernel = flagged!(penalty::Penalty; thread, friction, periodic);
-            let stage = coded(kernel, name, items.len(), 64, &touched, &pushed, params);
-            b.plan.step.push(Stage { first: items.start, ..stage });
-            waits = false;
-        }
-        ContactBuffers { sums, keys, state, found }
+        let kernel = flagged!(penalty::Penalty; thread, friction, periodic);
+        b.plan.step.push(coded(kernel, names.step, count, 64, &reads, &writes, params));
+        FaceBuffers { sums, carriers, near, gaps, keys, touches, found }
     }
 
     /// Beams against beams.
@@ -218,16 +277,14 @@ impl ContactScene<'_> {
         bows: [Buffer; 2],
         (force, stiffness): (Buffer, Buffer),
         params: Params,
-    ) -> ContactBuffers {
-        let (beams, slots, size) = (self.threads.thread.len(), self.capacity.beam_slots, params.state as usize);
+    ) -> PairBuffers {
+        let (beams, slots, size) = (self.threads.beams(), self.capacity.beam_slots, params.state as usize);
         let Active { friction, periodic, .. } = self.active;
-        let of = b.indices("threads of beams", self.threads.thread.clone());
-        let arcs = b.table("arc lengths", self.threads.arcs.clone());
         let keys = b.add("beam pairs", Kind::Uint, slots * beams, true, Initial::Uint(vec![EMPTY; slots * beams]));
         let state = b.add("beam pair state", Kind::Scalar, size * slots * beams, true, Initial::Zero);
         let sums = b.scratch("beam pair sums", penalty::sums(friction, periodic) * beams);
         let common = [&[self.ends, self.beams][..], &self.place(), &bows].concat();
-        let reads = [&common[..], &[of, arcs, search.counts, search.lists, search.boxes]].concat();
+        let reads = [&common[..], &[search.counts, search.lists, search.boxes]].concat();
         let found = b.add("when pairs were found", Kind::Uint, beams, true, Initial::Uint(vec![NEVER; beams]));
         let keys_own = (keys, own(1, slots));
         let state_own = (state, own(1, size * slots));
@@ -246,7 +303,7 @@ impl ContactScene<'_> {
         ];
         let kernel = flagged!(threads::Force; friction, periodic);
         b.plan.step.push(coded(kernel, "thread-thread contact", beams, 32, &reads, &writes, params));
-        ContactBuffers { sums, keys, state, found }
+        PairBuffers { sums, keys, state, found }
     }
 
     /// Nodes of cut threads that are held; energies and number of ties.
@@ -278,8 +335,11 @@ impl ContactScene<'_> {
             None => ([low[0] - CELL, low[1] - CELL], [high[0] - low[0] + 2.0 * CELL, high[1] - low[1] + 2.0 * CELL]),
         };
         let cells = size.map(|s| (libm::floor(s / CELL) as u32).clamp(1, 1024));
-        let stiffest = surfaces.values.chunks_exact(penalty::SLAVE_VALUES).map(|v| v[0]).fold(0.0, f64::max);
-        let stiffest = stiffest.max(self.chosen.thread_thread_penalty_n_mm);
+        let points = surfaces.carried.iter().flat_map(|carried| carried.points.chunks_exact(penalty::POINT));
+        let stiffest = points.map(|point| point[4]).fold(0.0, f64::max);
+        let longest = self.threads.beams.chunks_exact(beam2::TABLE).map(|beam| beam[3]).fold(0.0, f64::max);
+        let stiffest = stiffest.max(self.chosen.tie_n_mm);
+        let along = self.chosen.thread_thread_penalty_n_mm2 * longest;
         let radius = self.threads.radius.iter().copied().fold(0.0, f64::max);
         let thickness = mesh.blocks.iter().map(|b| thickness(mesh, b)).fold(f64::INFINITY, f64::min);
         let depth = 0.5 * thickness.min(0.4);
@@ -288,6 +348,7 @@ impl ContactScene<'_> {
             period: mesh.period.unwrap_or_default().map(quanta),
             cells,
             capacity: self.capacity.cell as u32,
+            faces: self.capacity.faces as u32,
             slots: self.capacity.slots as u32,
             beam_slots: self.capacity.beam_slots as u32,
             slabs: slabs as u32,
@@ -297,12 +358,13 @@ impl ContactScene<'_> {
             friction: if self.active.friction { self.friction as f32 } else { 0.0 },
             tangential: self.chosen.tangential_ratio as f32,
             damping: self.chosen.damping_ratio as f32,
-            // a pair may reach 2²⁷ quanta, a node the sum of sixteen such pairs
-            force_quantum: (power(stiffest * (depth + radius)) / f64::from(1 << 27)) as f32,
-            stiffness_quantum: (power(64.0 * stiffest) / f64::from(1 << 28)) as f32,
+            // a pair may reach 2²⁷ quanta, a node the sum of sixteen such pairs; pieces of threads push with 0.39 k L r at most
+            force_quantum: (power((stiffest * (depth + radius)).max(along * radius)) / f64::from(1 << 27)) as f32,
+            stiffness_quantum: (power(64.0 * stiffest.max(along)) / f64::from(1 << 28)) as f32,
             thread_radius: radius as f32,
-            thread_thread: self.chosen.thread_thread_penalty_n_mm as f32,
-            self_arc: self.chosen.self_contact_arc_mm as f32,
+            thread_thread: self.chosen.thread_thread_penalty_n_mm2 as f32,
+            self_arc: mesh.self_arc() as f32,
+            beside: self.threads.beside() as f32,
             depth: depth.min(f64::from(f32::MAX)) as f32,
             state: slot_state(self.active.friction) as u32,
             // along each axis, so that it is as much in space

@@ -34,7 +34,7 @@ impl Active {
         let contact = effects.contact.as_ref();
         let thread_yarn = contact.is_some_and(|c| c.thread_yarn && yarns > 0 && threads > 0);
         let yarn_yarn = contact.is_some_and(|c| c.yarn_yarn && yarns > 1);
-        let thread_thread = contact.is_some_and(|c| c.thread_thread && beams_can_meet(mesh, c.self_contact_arc_mm));
+        let thread_thread = contact.is_some_and(|c| c.thread_thread && beams_can_meet(mesh));
         let touches = thread_yarn || yarn_yarn || thread_thread;
         let tightens = case.steps.iter().any(|step| matches!(step, Step::Pretension { .. }));
         Self {
@@ -68,7 +68,7 @@ impl Active {
 }
 
 /// Whether there are two beams far enough apart along their thread, or on two threads.
-fn beams_can_meet(mesh: &Mesh, arc: f64) -> bool {
+fn beams_can_meet(mesh: &Mesh) -> bool {
     let length = |thread: &crate::mesh::Thread| {
         let beam = |i| {
             let [a, b] = thread.beam(i).map(|end| mesh.position(end));
@@ -76,5 +76,5 @@ fn beams_can_meet(mesh: &Mesh, arc: f64) -> bool {
         };
         (0..thread.beams()).map(beam).sum::<f64>()
     };
-    mesh.threads.len() > 1 || mesh.threads.iter().any(|thread| length(thread) > arc)
+    mesh.threads.len() > 1 || mesh.threads.iter().any(|thread| length(thread) > mesh.self_arc())
 }

@@ -19,7 +19,7 @@ mod totals;
 
 use crate::case::Case;
 use crate::conditions::prescribed::{self, Prescribed};
-use crate::contact::{slot_state, status, travel};
+use crate::contact::{penalty, slot_state, status, travel};
 use crate::dynamics::assemble::{self, Assemble};
 use crate::dynamics::fibre_lines::{self, FibreLines};
 use crate::dynamics::integrate::{self, Integrate};
@@ -35,6 +35,7 @@ use crate::mesh::centre::centred;
 use bytemuck::Pod;
 use conditions::Conditions;
 use contact::ContactScene;
+pub use contact::FaceBuffers;
 pub use effects::Active;
 use hexes::HexBuffers;
 use solids::Solids;
@@ -62,21 +63,23 @@ pub struct Model {
     pub hex_at: Vec<usize>,
     /// Reference volume of each hexahedron, mm³.
     pub hex_volume: Vec<f64>,
-    /// Node, area or length, and whether it is a thread's, of each contact slave.
-    pub slaves: Vec<Slave>,
-    /// Numbers of a slot of a slave.
+    /// Contact points of threads and of yarn surfaces on yarns.
+    pub points: [Vec<ContactPoint>; 2],
+    /// Numbers of a touch of a point, and of a slot of a beam.
+    pub touch: usize,
     pub slot_state: usize,
     /// Largest share of the smallest contact radius or yarn thickness, mm, for guards.
     pub limits: Limits,
 }
 
-/// A contact slave node.
+/// A contact point.
 #[derive(Debug, Clone, Copy)]
-pub struct Slave {
-    pub node: usize,
+pub struct ContactPoint {
+    /// Nodes that it lies between, and its share in each.
+    pub nodes: [usize; 2],
+    pub shares: [f64; 2],
     /// mm² of a yarn surface, mm of a thread.
     pub measure: f64,
-    pub is_thread: bool,
 }
 
 /// Sizes that guards compare penetrations with, mm.
@@ -107,32 +110,37 @@ pub struct Buffers {
     pub bend_energy: Option<Buffer>,
     pub contact_force: Option<Buffer>,
     pub contact_stiffness: Option<Buffer>,
-    pub contact_sums: Option<Buffer>,
-    pub contact_keys: Option<Buffer>,
-    pub contact_state: Option<Buffer>,
-    /// See [`crate::contact::found`], of slaves and of beams.
-    pub found: [Option<Buffer>; 2],
+    /// Of threads and of yarns on yarns.
+    pub faces: [Option<FaceBuffers>; 2],
+    /// See [`crate::contact::found`]: of both, and of beams.
+    pub found: [Option<Buffer>; 3],
     pub pair_sums: Option<Buffer>,
     pub pair_keys: Option<Buffer>,
     pub pair_state: Option<Buffer>,
     pub prescribed: Option<Buffer>,
     pub reaction: Option<Buffer>,
-    /// Slip of each contact slave since the start, mm.
-    pub slip: Option<Buffer>,
+    /// Slip of each contact point of threads and of yarns since the start, mm.
+    pub slip: [Option<Buffer>; 2],
 }
 
-/// Sizes of contact's tables, which grow when they overflow: slots up to 16, those of beams up to
-/// [`MOST_PAIRS`](crate::contact::threads::MOST_PAIRS).
+/// Sizes of contact's tables, which grow when they overflow: faces near a beam or a node up to [`Self::MOST_FACES`], slots for
+/// bodies up to [`Self::MOST_SLOTS`], those of beams up to [`MOST_PAIRS`](crate::contact::threads::MOST_PAIRS).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacity {
     pub cell: usize,
+    pub faces: usize,
     pub slots: usize,
     pub beam_slots: usize,
 }
 
+impl Capacity {
+    pub const MOST_FACES: usize = 512;
+    pub const MOST_SLOTS: usize = 64;
+}
+
 impl Default for Capacity {
     fn default() -> Self {
-        Self { cell: 192, slots: 12, beam_slots: 16 }
+        Self { cell: 192, faces: 32, slots: 6, beam_slots: 16 }
     }
 }
 
@@ -239,7 +247,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let hourglass = case.integration.hourglass_control();
     let solids = Solids::new(mesh, hourglass)?;
     let threads = Threads::new(mesh, active.bending, &conditions.held);
-    let (hexes, beams, bends) = (solids.headers.len(), threads.thread.len(), threads.pairs.len() / 2);
+    let (hexes, beams, bends) = (solids.headers.len(), threads.beams(), threads.pairs.len() / 2);
     let first_thread = first as u32;
 
     let mut b = Builder::default();
@@ -337,6 +345,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         };
         scene.add(&mut b)
     });
+    let contact = contact.transpose()?;
     if let Some([search_quanta, search_remainder]) = searched {
         let writes = [(search_quanta, own(3, 1)), (search_remainder, own(3, 1))];
         let reads = [quanta_, remainder];
@@ -460,14 +469,14 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let kernel = flagged!(WeighedLimit; active.bending);
     b.plan.diagnose.push(waiting(coded(kernel, "weighed limit", nodes, NODE_GRAIN, &reads, &writes, params)));
 
-    let (faces, pairs) = contact.as_ref().map_or((None, None), |c| (c.faces, c.pairs));
+    let (faces, pairs) = contact.as_ref().map_or(([None; 2], None), |c| (c.faces, c.pairs));
     let sources = totals::Sources {
         mesh,
         masses: &floored,
         hex_place: &solids.place,
         hex_blocks: hexes,
         bends,
-        slaves: contact.as_ref().map_or(0, |c| c.slaves.len()),
+        points: contact.as_ref().map_or([0; 2], |c| [0, 1].map(|kind| c.points[kind].len())),
         active,
         conditions: condition_nodes.map_or(0, |(_, count)| count),
         mass,
@@ -484,7 +493,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         beam_virial,
         bend_energy: bent.as_ref().map(|bent| bent.energy),
         bend_virial,
-        contact_sums: faces.map(|f| f.sums),
+        face_sums: faces.map(|kind| kind.map(|f| f.sums)),
         pair_sums: pairs.map(|p| p.sums),
         ties: contact.as_ref().and_then(|c| c.ties),
         reaction_work,
@@ -520,10 +529,8 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             bend_energy: bent.as_ref().map(|bent| bent.energy),
             contact_force: contact.as_ref().map(|c| c.force),
             contact_stiffness: contact.as_ref().map(|c| c.stiffness),
-            contact_sums: faces.map(|f| f.sums),
-            contact_keys: faces.map(|f| f.keys),
-            contact_state: faces.map(|f| f.state),
-            found: [faces, pairs].map(|kind| kind.map(|kind| kind.found)),
+            faces,
+            found: [faces[0].map(|f| f.found), faces[1].map(|f| f.found), pairs.map(|p| p.found)],
             pair_sums: pairs.map(|p| p.sums),
             pair_keys: pairs.map(|p| p.keys),
             pair_state: pairs.map(|p| p.state),
@@ -542,7 +549,8 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         hex_at,
         hex_place: solids.place,
         hex_volume: solids.volume,
-        slaves: contact.map_or_else(Vec::new, |c| c.slaves),
+        points: contact.map_or_else(Default::default, |c| c.points),
+        touch: penalty::touch(active.friction),
         slot_state: slot_state(active.friction),
         limits: Limits { thread_radius: radius, yarn_thickness: thickness },
     })

@@ -35,13 +35,9 @@ pub struct Threads {
     pub line_stiffness: Vec<f64>,
     /// See [`crate::dynamics::time_step::ROWS`].
     pub bend_rows: Vec<f64>,
-    /// Thread of each beam.
-    pub thread: Vec<u32>,
     /// See [`crate::contact::bow`].
     pub neighbours: Vec<u32>,
     pub shares: Vec<f64>,
-    /// See [`crate::contact::threads::ARC`].
-    pub arcs: Vec<f64>,
     /// Radius of each thread node, mm.
     pub radius: Vec<f64>,
 }
@@ -61,10 +57,9 @@ impl Threads {
             ..Self::default()
         };
         for (number, thread) in mesh.threads.iter().enumerate() {
-            let base = t.thread.len();
+            let base = t.thermal.len();
             let count = thread.beams();
             t.radius[thread.first - first..][..thread.count].fill(thread.radius);
-            let mut arc = 0.0;
             let mut lengths = Vec::with_capacity(count);
             for i in 0..count {
                 let [a, b] = thread.beam(i);
@@ -77,9 +72,6 @@ impl Threads {
                 t.beams.extend([d[0], d[1], d[2], length, axial]);
                 let tightened = thread.thermal_strain != 0.0;
                 t.thermal.push(if tightened { thread.thermal_strain * (1.0 + excess) + excess } else { 0.0 });
-                t.thread.push(number as u32);
-                t.arcs.extend([arc + 0.5 * length, length, 0.0]);
-                arc += length;
                 lengths.push(length);
                 for node in [a.node - first, b.node - first] {
                     t.mass[node] += 0.5 * curve * thread.linear_density;
@@ -90,18 +82,7 @@ impl Threads {
                 t.slots[THREAD * (b.node - first) + 1] = (base + i) as u32;
             }
             let closed = thread.wrap.is_some();
-            for i in 0..count {
-                let inner = closed || (i > 0 && i + 1 < count);
-                let beside = if inner { [(i + count - 1) % count, (i + 1) % count] } else { [i; 2] };
-                t.neighbours.extend(beside.map(|at| (base + at) as u32));
-                let [before, behind] = beside.map(|at| lengths[at]);
-                t.shares.extend(if inner { bow::shares(before, lengths[i], behind) } else { [0.0; 2] });
-            }
-            if closed {
-                for beam in base..base + count {
-                    t.arcs[3 * beam + 2] = arc;
-                }
-            }
+            t.line(number, base, thread.wrap, &lengths);
             if !bending || thread.bending == 0.0 {
                 continue;
             }
@@ -133,5 +114,42 @@ impl Threads {
             }
         }
         t
+    }
+
+    /// Tables of the line of a thread, whose first beam is number `base` of all, from the lengths of its beams.
+    fn line(&mut self, thread: usize, base: usize, wrap: Option<[i32; 2]>, lengths: &[f64]) {
+        let count = lengths.len();
+        let whole: f64 = lengths.iter().sum();
+        let [x, y] = wrap.unwrap_or_default();
+        let mut arc = 0.0;
+        for (i, &length) in lengths.iter().enumerate() {
+            let at = |there: bool, beam: usize| if there || wrap.is_some() { beam % count } else { i };
+            let [before, behind] = [at(i > 0, i + count - 1), at(i + 1 < count, i + 1)];
+            self.neighbours.extend([(base + before) as u32, (base + behind) as u32, thread as u32, x as u32, y as u32]);
+            let shares =
+                |end: bool, a: usize, b: usize| if end { [0.0; 2] } else { bow::shares(lengths[a], lengths[b]) };
+            self.shares.extend(shares(before == i, before, i));
+            self.shares.extend(shares(behind == i, i, behind));
+            self.shares.extend([arc + 0.5 * length, length, if wrap.is_some() { whole } else { 0.0 }]);
+            arc += length;
+        }
+    }
+
+    /// Number of beams.
+    pub fn beams(&self) -> usize {
+        self.thermal.len()
+    }
+
+    /// Largest distance from the ends of a piece of a line to where they were if it were moved as a whole, mm: half the sum of the
+    /// largest shifts of its ends.
+    pub fn beside(&self) -> f64 {
+        let length = |beam: usize| self.beams[TABLE * beam + 3];
+        let shifts = (0..self.beams()).map(|beam| {
+            let [n, s] = [bow::NEIGHBOURS * beam, bow::SHARES * beam];
+            let (before, behind) = (self.neighbours[n] as usize, self.neighbours[n + 1] as usize);
+            let s = &self.shares[s..][..bow::ARC];
+            s[0] * length(before) + (s[1] + s[2]) * length(beam) + s[3] * length(behind)
+        });
+        0.5 * shifts.fold(0.0, f64::max)
     }
 }

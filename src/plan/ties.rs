@@ -3,7 +3,7 @@
 use crate::case::Case;
 use crate::case::domain::{Domain, ThreadEnds};
 use crate::case::effects::Contact;
-use crate::contact::face::{Closest, closest};
+use crate::contact::face::{Patch, closest};
 use crate::fabric::specimen;
 use crate::mesh::surface::Surface;
 use crate::mesh::vector::{norm, sub};
@@ -36,7 +36,7 @@ struct Held {
 }
 
 impl Ties {
-    /// Ties of a case, as stiff as pairs of beams; none but in a specimen whose cut threads are held.
+    /// Ties of a case; none but in a specimen whose cut threads are held.
     pub fn new(case: &Case, mesh: &Mesh, contact: &Contact) -> Self {
         let Domain::Specimen(specimen) = &case.domain else { return Self::default() };
         if specimen.thread_ends == ThreadEnds::Free {
@@ -63,7 +63,7 @@ impl Ties {
         for Held { node, corners, weights, .. } in held.into_values() {
             ties.nodes.push(node as u32);
             ties.nodes.extend(corners.map(|n| n as u32));
-            ties.values.extend(weights.into_iter().chain([contact.thread_thread_penalty_n_mm]));
+            ties.values.extend(weights.into_iter().chain([contact.tie_n_mm]));
         }
         ties
     }
@@ -111,14 +111,15 @@ fn nearest(mesh: &Mesh, block: &Block, node: usize, radius: f64) -> Option<Held>
             let (next, here) = ((ring + 1) % surface.ring(), ring);
             let corners = [(here, slice), (here, slice + 1), (next, slice + 1), (next, slice)]
                 .map(|(ring, slice)| surface.node(ring, slice).node);
-            let point: Closest<f64> = closest(&corners.map(|n| sub(mesh.nodes[n], at)));
+            let seen = corners.map(|n| sub(mesh.nodes[n], at));
+            let point = closest(&seen, &Patch::new(&seen));
             if !point.interior || point.distance > radius + FAR {
                 continue;
             }
             let tip = slice == 0 || slice + 1 == block.slices;
             let far = point.distance + if tip { TIP } else { 0.0 };
             if best.as_ref().is_none_or(|best| far < best.far) {
-                best = Some(Held { node, corners, weights: point.weights(), far });
+                best = Some(Held { node, corners, weights: point.weights, far });
             }
         }
     }

@@ -58,7 +58,7 @@ pub struct Totals {
     pub reaction: Option<Sums>,
     /// Of hexahedra, beams and bends: nine components each.
     pub stress: Vec<Sums>,
-    /// Of slaves and pairs of beams: columns as in [`penalty`].
+    /// Of points and pairs of beams: columns as in [`penalty`].
     pub contact: Vec<Sums>,
     /// Elastic energy of ties.
     pub ties: Option<Sums>,
@@ -88,7 +88,8 @@ pub(super) struct Sources<'a> {
     pub hex_place: &'a [(usize, usize)],
     pub hex_blocks: usize,
     pub bends: usize,
-    pub slaves: usize,
+    /// Contact points of threads and of yarns.
+    pub points: [usize; 2],
     pub active: Active,
     pub conditions: usize,
     pub mass: Buffer,
@@ -105,7 +106,7 @@ pub(super) struct Sources<'a> {
     pub beam_virial: Option<Buffer>,
     pub bend_energy: Option<Buffer>,
     pub bend_virial: Option<Buffer>,
-    pub contact_sums: Option<Buffer>,
+    pub face_sums: [Option<Buffer>; 2],
     pub pair_sums: Option<Buffer>,
     /// Energies of ties, and their number.
     pub ties: Option<(Buffer, usize)>,
@@ -239,18 +240,21 @@ impl Collector<'_> {
     }
 }
 
-/// Adds the stages of totals; returns where they are, and the slip of contact slaves.
-pub(super) fn add(b: &mut Builder, s: &Sources) -> (Totals, Option<Buffer>) {
+/// Adds the stages of totals; returns where they are, and the slip of contact points.
+pub(super) fn add(b: &mut Builder, s: &Sources) -> (Totals, [Option<Buffer>; 2]) {
     let (nodes, beams, first) = (s.mesh.nodes.len(), s.mesh.beams(), s.mesh.first_thread_node());
     let buffer = b.scratch("totals", 0);
     let Active { friction, periodic, .. } = s.active;
-    let slip = s.contact_sums.filter(|_| friction).map(|sums| {
-        let slip = b.scratch("slip", s.slaves);
-        let own = Access::Own { planes: 1, stride: 1 };
-        let kernel = flagged!(slip::Slip; periodic);
-        b.plan.collect.push(coded(kernel, "slip", s.slaves, 512, &[sums], &[(slip, own)], [0u32; 0]));
-        slip
-    });
+    let mut slip = [None; 2];
+    for (kind, name) in [(0, "slip of thread points"), (1, "slip of yarn points")] {
+        slip[kind] = s.face_sums[kind].filter(|_| friction).map(|sums| {
+            let slip = b.scratch(name, s.points[kind]);
+            let own = Access::Own { planes: 1, stride: 1 };
+            let kernel = flagged!(slip::Slip; periodic);
+            b.plan.collect.push(coded(kernel, "slip", s.points[kind], 512, &[sums], &[(slip, own)], [0u32; 0]));
+            slip
+        });
+    }
     let jacobian = s.hex_energy.map(|energy| {
         let mut used = vec![0; s.hex_blocks];
         s.hex_place.iter().for_each(|(block, _)| used[*block] += 1);
@@ -258,8 +262,9 @@ pub(super) fn add(b: &mut Builder, s: &Sources) -> (Totals, Option<Buffer>) {
     });
     let c = &mut Collector { b, totals: buffer };
     let mut contact = Vec::new();
-    if let Some(sums) = s.contact_sums {
-        contact.push(c.taken(sums, Columns::rows(s.slaves, penalty::sums(friction, periodic)), true));
+    for (sums, points) in s.face_sums.into_iter().zip(s.points) {
+        let Some(sums) = sums else { continue };
+        contact.push(c.taken(sums, Columns::rows(points, penalty::sums(friction, periodic)), true));
     }
     if let Some(sums) = s.pair_sums {
         contact.push(c.taken(sums, Columns::rows(beams, penalty::sums(friction, periodic)), false));

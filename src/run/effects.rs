@@ -5,7 +5,7 @@ use crate::case::domain::{Domain, ThreadEnds};
 use crate::case::effects::Contact;
 use crate::case::read::Loaded;
 use crate::contact::EMPTY;
-use crate::kernel::buffer::Buffer;
+use crate::contact::penalty::MADE;
 use crate::simulate::Simulation;
 
 /// An effect that a scene has.
@@ -221,16 +221,16 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
     found
 }
 
-/// Nodes of threads and of yarns that have a yarn within reach, and pairs of beams within reach of each other.
+/// Beams and nodes of yarns that have another yarn within reach, and pairs of beams within reach of each other.
 fn near(simulation: &Simulation) -> [usize; 3] {
     let buffers = &simulation.model.buffers;
-    let keys = |buffer: Option<Buffer>| buffer.map_or_else(Vec::new, |buffer| simulation.backend().uints(buffer));
-    let slaves = &simulation.model.slaves;
-    let faces = keys(buffers.contact_keys);
-    let row = (faces.len() / slaves.len().max(1)).max(1);
-    let of = |is_thread: bool| {
-        let nodes = faces.chunks_exact(row).zip(slaves).filter(|(_, slave)| slave.is_thread == is_thread);
-        nodes.filter(|(keys, _)| keys[0] != EMPTY).count()
-    };
-    [of(true), of(false), keys(buffers.pair_keys).iter().filter(|key| **key != EMPTY).count()]
+    let entries = |buffer| simulation.backend().uints(buffer);
+    let [threads, yarns] = buffers.faces.map(|faces| {
+        faces.map_or(0, |faces| {
+            let (lists, carriers) = (entries(faces.near), simulation.model.plan.buffers[faces.found.0].len);
+            lists.chunks_exact(lists.len() / carriers).filter(|list| list[MADE] != EMPTY).count()
+        })
+    });
+    let pairs = buffers.pair_keys.map_or(0, |keys| entries(keys).iter().filter(|key| **key != EMPTY).count());
+    [threads, yarns, pairs]
 }

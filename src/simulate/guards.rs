@@ -1,8 +1,8 @@
 //! Guards: each names the cause, where it was, its size, and what to change.
 
 use super::Simulation;
-use crate::contact::penalty::{LEAST_FORCE, SLOT_KEYS};
-use crate::contact::{EMPTY, of_key, status};
+use crate::contact::candidates::CARRIER;
+use crate::contact::{EMPTY, of_key, penalty, status};
 use crate::error::{Error, Guard, Result};
 use crate::kernel::buffer::Buffer;
 use crate::kernel::position::MOST_MM;
@@ -63,52 +63,48 @@ impl Simulation {
     /// nothing touches any more.
     fn deepest(&self, kind: usize) -> Option<String> {
         let b = &self.model.buffers;
-        let size = self.model.slot_state;
-        // items with the stiffness of each, and what a key says of the other body
-        let find = |keys: Buffer, state: Buffer, stride: usize, slots: usize, items: &[(usize, f64)]| {
-            let (keys, state) = (self.backend.uints(keys), self.backend.scalars(state));
-            let slots =
-                items.iter().flat_map(|(item, measure)| (0..slots).map(move |s| (*item, item * slots + s, measure)));
-            let touching =
-                slots.filter(|(_, slot, _)| keys[stride * slot] != EMPTY && state[size * slot] > LEAST_FORCE);
-            let deepest = touching.max_by(|a, b| (state[size * a.1] / a.2).total_cmp(&(state[size * b.1] / b.2)));
-            deepest.map(|(item, slot, _)| (item, of_key(keys[stride * slot]).0))
-        };
         if kind == 2 {
-            let beams: Vec<(usize, f64)> = (0..self.mesh.beams()).map(|beam| (beam, 1.0)).collect();
-            let (beam, other) = find(b.pair_keys?, b.pair_state?, 1, self.capacity.beam_slots, &beams)?;
-            return Some(format!("beams {beam} and {other}"));
+            let (keys, state) = (self.backend.uints(b.pair_keys?), self.backend.scalars(b.pair_state?));
+            let size = self.model.slot_state;
+            let touching = (0..keys.len()).filter(|slot| keys[*slot] != EMPTY && state[size * slot] > 0.0);
+            let slot = touching.max_by(|x, y| state[size * x].total_cmp(&state[size * y]))?;
+            return Some(format!("beams {} and {}", slot / self.capacity.beam_slots, of_key(keys[slot]).0));
         }
-        let slaves = self.model.slaves.iter().enumerate().filter(|(_, slave)| slave.is_thread == (kind == 0));
-        let slaves: Vec<(usize, f64)> = slaves.map(|(item, slave)| (item, slave.measure)).collect();
-        let (item, body) = find(b.contact_keys?, b.contact_state?, SLOT_KEYS, self.capacity.slots, &slaves)?;
-        let node = self.model.slaves[item].node;
-        let body = &self.mesh.blocks[body].name;
+        let faces = b.faces[kind]?;
+        let (keys, touches) = (self.backend.uints(faces.keys), self.backend.scalars(faces.touches));
+        let (slots, points) = (self.capacity.slots, &self.model.points[kind]);
+        let keys = keys.chunks_exact(penalty::MADE + slots).flat_map(|row| &row[penalty::MADE..]);
+        let keys: Vec<u32> = keys.copied().collect();
+        let pressure = |slot: usize| touches[slot * self.model.touch] / points[slot / slots].measure;
+        let touching = (0..keys.len()).filter(|slot| keys[*slot] != EMPTY);
+        let slot = touching.max_by(|x, y| pressure(*x).total_cmp(&pressure(*y)))?;
+        let node = points[slot / slots].nodes[0];
+        let body = &self.mesh.blocks[of_key(keys[slot]).0].name;
         Some(format!("node {node} ({}) in {body}", self.node_owner(node)))
     }
 
-    /// The slave node or the beam with most candidates for contact.
+    /// The beam or the node of a yarn with most candidates for contact.
     pub(super) fn most_crowded(&self) -> Option<String> {
         let b = &self.model.buffers;
-        // the first item with most, of those with `slots` keys of `stride` numbers
-        let most = |keys: Buffer, stride: usize, slots: usize| {
-            let keys = self.backend.uints(keys);
-            let count = |item: &[u32]| item.chunks_exact(stride).filter(|key| key[0] != EMPTY).count();
-            let counts = keys.chunks_exact(stride * slots).map(count).enumerate();
+        // the first item with most of those with `row` entries
+        let most = |entries: Buffer, before: usize, row: usize| {
+            let entries = self.backend.uints(entries);
+            let count = |item: &[u32]| item[before..].iter().filter(|entry| **entry != EMPTY).count();
+            let counts = entries.chunks_exact(before + row).map(count).enumerate();
             counts.fold((0, 0), |best, now| if now.1 > best.1 { now } else { best })
         };
-        let slave = b.contact_keys.map_or((0, 0), |keys| most(keys, SLOT_KEYS, self.capacity.slots));
-        let beam = b.pair_keys.map_or((0, 0), |keys| most(keys, 1, self.capacity.beam_slots));
-        if slave.1 + beam.1 == 0 {
-            return None;
-        }
-        let (what, count) = if slave.1 >= beam.1 {
-            let node = self.model.slaves[slave.0].node;
-            (format!("node {node} ({})", self.node_owner(node)), slave.1)
-        } else {
-            (format!("beam {}", beam.0), beam.1)
-        };
-        Some(format!("{what} with {count}"))
+        let of_faces = [0, 1].map(|kind| {
+            let faces = b.faces[kind]?;
+            let (item, count) = most(faces.near, penalty::MADE, self.capacity.faces);
+            let of_list = |carrier: &[u32]| carrier[0] as usize;
+            let first = self.backend.uints(faces.carriers).chunks_exact(CARRIER).nth(item).map(of_list)?;
+            let node = self.model.points[kind][first].nodes[0];
+            Some((count, format!("node {node} ({}) with {count} faces", self.node_owner(node))))
+        });
+        let of_beams = b.pair_keys.map(|keys| most(keys, 0, self.capacity.beam_slots));
+        let of_beams = of_beams.map(|(beam, count)| (count, format!("beam {beam} with {count} beams")));
+        let crowded = of_faces.into_iter().flatten().chain(of_beams).filter(|(count, _)| *count > 0);
+        crowded.max_by_key(|(count, _)| *count).map(|(_, what)| what)
     }
 
     /// Stops a step that the user fixed and that cannot be stable; one that follows the estimate shortens by itself.

@@ -3,7 +3,6 @@
 use super::{Simulation, StressMean};
 use crate::contact::penalty;
 use crate::error::Result;
-use crate::kernel::row::Row;
 use crate::kernel::stage::Stage;
 use crate::plan::Sums;
 
@@ -92,10 +91,11 @@ impl Simulation {
         let (Some(force), Some(stiffness)) = (b.contact_force, b.contact_stiffness) else { return Ok(0.0) };
         let contact = |stage: &&Stage| stage.writes.iter().any(|(buffer, _)| *buffer == force) && !stage.waits;
         let stages: Vec<Stage> = self.model.plan.step.iter().filter(contact).cloned().collect();
-        let row = Row { approach: 2.0 * penalty::AT_REST, ..self.schedule.row(self.time, 1e-12, 1e-12) };
+        let row = self.schedule.row(self.time, 1e-12, 1e-12);
         self.backend.run(&stages, &[row]);
         let taken = |stage: &&Stage| {
-            let sums = |buffer| [b.contact_sums, b.pair_sums].contains(&Some(buffer));
+            let faces = b.faces.iter().flatten().map(|faces| faces.sums);
+            let sums = |buffer| faces.clone().chain(b.pair_sums).any(|sums| sums == buffer);
             stage.writes.iter().any(|(buffer, _)| sums(*buffer))
         };
         let stages: Vec<Stage> = self.model.plan.collect.iter().filter(taken).cloned().collect();

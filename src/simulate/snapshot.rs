@@ -1,9 +1,10 @@
 //! The whole state of a scene as bytes, and a scene that goes on from it to the same bits.
 
 use super::{Energies, Health, Simulation, StressMean, WINDOW};
-use crate::contact::penalty::SLOT_KEYS;
+use crate::contact::face::FACE;
+use crate::contact::penalty::MADE;
 use crate::contact::threads::MOST_PAIRS;
-use crate::contact::{Body, EMPTY, of_key, status};
+use crate::contact::{EMPTY, of_key, status};
 use crate::error::{Error, Result};
 use crate::kernel::buffer::{Buffer, Initial};
 use crate::kernel::record::{Record, Recorded};
@@ -78,8 +79,8 @@ impl Recorded for StressMean {
 
 impl Recorded for Capacity {
     fn record(&mut self, record: &mut Record) {
-        let Self { cell, slots, beam_slots } = self;
-        [cell, slots, beam_slots].into_iter().for_each(|x| x.record(record));
+        let Self { cell, faces, slots, beam_slots } = self;
+        [cell, faces, slots, beam_slots].into_iter().for_each(|x| x.record(record));
     }
 }
 
@@ -124,8 +125,13 @@ impl Simulation {
         let mut record = Record::read(host);
         let mut capacity = Capacity::default();
         capacity.record(&mut record);
-        let Capacity { cell, slots, beam_slots } = capacity;
-        let sizes = [(cell, LARGEST_CELL), (slots, 16), (beam_slots, MOST_PAIRS)];
+        let Capacity { cell, faces, slots, beam_slots } = capacity;
+        let sizes = [
+            (cell, LARGEST_CELL),
+            (faces, Capacity::MOST_FACES),
+            (slots, Capacity::MOST_SLOTS),
+            (beam_slots, MOST_PAIRS),
+        ];
         if sizes.into_iter().any(|(size, most)| size == 0 || size > most) {
             return Err(Error::geometry("a damaged state", format!("its tables of contact have sizes {capacity:?}")));
         }
@@ -185,20 +191,19 @@ impl Simulation {
             let message = format!("{what} {at} of {:?} is in no table", self.model.plan.buffers[buffer.0].name);
             Err(Error::geometry("a damaged state", message))
         };
-        if Some(buffer) == b.contact_keys {
-            let tables = &self.model.plan.buffers;
-            let bodies: Vec<Body> = match tables.iter().find(|table| table.name == "bodies").map(|table| &table.initial)
-            {
-                Some(Initial::Uint(bodies)) => bytemuck::pod_collect_to_vec(bodies),
-                _ => vec![],
-            };
-            let is_there = |slot: &[u32]| {
-                let Some(body) = bodies.get(of_key(slot[0]).0) else { return false };
-                slot[1] < body.ring && (body.closed == 1 || slot[2] < body.slices)
-            };
-            let bad = |slot: &[u32]| slot[0] != EMPTY && !is_there(slot);
-            if let Some(at) = numbers().chunks_exact(SLOT_KEYS).position(bad) {
-                return damaged("the face of slot", at);
+        let lists = b.faces.iter().flatten();
+        if lists.clone().any(|faces| faces.near == buffer) {
+            let faces = self.model.plan.buffers.iter().find(|table| table.name == "faces");
+            let faces = faces.map_or(0, |table| table.len / FACE);
+            let bad = |list: &[u32]| list[MADE..].iter().any(|entry| *entry != EMPTY && of_key(*entry).0 >= faces);
+            if let Some(at) = numbers().chunks_exact(MADE + self.capacity.faces).position(bad) {
+                return damaged("a face of list", at);
+            }
+        } else if lists.clone().any(|faces| faces.keys == buffer) {
+            let bodies = self.mesh.blocks.len();
+            let bad = |keys: &[u32]| keys[MADE..].iter().any(|key| *key != EMPTY && of_key(*key).0 >= bodies);
+            if let Some(at) = numbers().chunks_exact(MADE + self.capacity.slots).position(bad) {
+                return damaged("a body that is touched by point", at);
             }
         } else if Some(buffer) == b.pair_keys {
             let beams = self.mesh.beams();

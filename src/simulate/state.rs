@@ -141,31 +141,41 @@ impl Simulation {
         fields
     }
 
-    /// Normal force, pressure, and with friction slip of contact slaves, on nodes.
+    /// Normal force, pressure of yarn surfaces, and with friction slip of contact points, on the nodes that they lie between.
     pub(super) fn contact_fields(&self) -> Vec<Field> {
         let b = &self.model.buffers;
-        let (Some(keys), Some(state)) = (b.contact_keys, b.contact_state) else { return Vec::new() };
-        let (keys, state) = (self.backend.uints(keys), self.backend.scalars(state));
-        let slipped = b.slip.map(|b| self.backend.scalars(b));
         let nodes = self.mesh.nodes.len();
         let (mut force, mut pressure, mut slip) = (vec![0.0; nodes], vec![0.0; nodes], vec![0.0; nodes]);
-        let slots = self.capacity.slots;
-        for (item, slave) in self.model.slaves.iter().enumerate() {
-            let normal: f64 = (0..slots)
-                .map(|s| item * slots + s)
-                .filter(|s| keys[s * penalty::SLOT_KEYS] != EMPTY)
-                .map(|s| state[s * self.model.slot_state])
-                .filter(|force| *force > penalty::LEAST_FORCE)
-                .sum();
-            force[slave.node] = normal;
-            slip[slave.node] = slipped.as_ref().map_or(0.0, |slipped| slipped[item]);
-            if !slave.is_thread && slave.measure > 0.0 {
-                pressure[slave.node] = normal / slave.measure;
+        let mut measure = vec![0.0; nodes];
+        for (kind, faces) in b.faces.iter().enumerate() {
+            let Some(faces) = faces else { continue };
+            let (keys, touches) = (self.backend.uints(faces.keys), self.backend.scalars(faces.touches));
+            let slipped = b.slip[kind].map(|b| self.backend.scalars(b));
+            let slots = self.capacity.slots;
+            for (item, point) in self.model.points[kind].iter().enumerate() {
+                let keys = &keys[item * (penalty::MADE + slots)..][penalty::MADE..][..slots];
+                let slots = (0..slots).filter(|slot| keys[*slot] != EMPTY).map(|slot| item * slots + slot);
+                let normal: f64 = slots.map(|slot| touches[slot * self.model.touch + penalty::NORMAL]).sum();
+                for (node, share) in point.nodes.into_iter().zip(point.shares) {
+                    force[node] += share * normal;
+                    slip[node] += share * point.measure * slipped.as_ref().map_or(0.0, |slipped| slipped[item]);
+                    measure[node] += share * point.measure;
+                    if kind == 1 && point.measure > 0.0 {
+                        pressure[node] += share * normal / point.measure;
+                    }
+                }
             }
         }
+        if b.faces.iter().all(Option::is_none) {
+            return Vec::new();
+        }
+        slip.iter_mut()
+            .zip(&measure)
+            .filter(|(_, measure)| **measure > 0.0)
+            .for_each(|(slip, measure)| *slip /= measure);
         let field = |name: &str, values| Field { name: name.into(), components: 1, values };
         let mut fields = vec![field("contact_force_n", force), field("contact_pressure_mpa", pressure)];
-        fields.extend(slipped.map(|_| field("slip_mm", slip)));
+        fields.extend(b.slip.iter().any(Option::is_some).then(|| field("slip_mm", slip)));
         fields
     }
 

@@ -45,10 +45,11 @@ const MASS_FACTOR: &str = "effects.contact_mass.factor";
 const LEAST_LIMIT: &str = "effects.contact_mass.least_limit_s";
 const RATE: &str = "effects.damping.rate_per_s";
 const SKIN: &str = "effects.contact.skin_mm";
-const PENALTIES: [&str; 3] = [
+const PENALTIES: [&str; 4] = [
     "effects.contact.thread_penalty_n_mm2",
     "effects.contact.yarn_penalty_n_mm3",
-    "effects.contact.thread_thread_penalty_n_mm",
+    "effects.contact.thread_thread_penalty_n_mm2",
+    "effects.contact.tie_n_mm",
 ];
 
 /// What errors are measured against: finer, in f64, with half the time step, and loaded twice as slowly.
@@ -124,12 +125,22 @@ pub const TURNS: &[Turn] = &[
     turn(
         "contact stiffness",
         "penalties × 0.5",
-        &[(PENALTIES[0], Times(0.5)), (PENALTIES[1], Times(0.5)), (PENALTIES[2], Times(0.5))],
+        &[
+            (PENALTIES[0], Times(0.5)),
+            (PENALTIES[1], Times(0.5)),
+            (PENALTIES[2], Times(0.5)),
+            (PENALTIES[3], Times(0.5)),
+        ],
     ),
     turn(
         "contact stiffness",
         "penalties × 2",
-        &[(PENALTIES[0], Times(2.0)), (PENALTIES[1], Times(2.0)), (PENALTIES[2], Times(2.0))],
+        &[
+            (PENALTIES[0], Times(2.0)),
+            (PENALTIES[1], Times(2.0)),
+            (PENALTIES[2], Times(2.0)),
+            (PENALTIES[3], Times(2.0)),
+        ],
     ),
     turn("search interval", "skin × 0.5", &[(SKIN, Times(0.5))]),
     turn("search interval", "skin × 2", &[(SKIN, Times(2.0))]),

@@ -1,0 +1,48 @@
+//! Where a thread touches yarns: points along each beam, on the arc that its chord stands for.
+//!
+//! A chain of chords around an edge lets it through between two nodes that are further apart than the thread is thick. Points at
+//! most 1.5 radii apart do not. A point at a share s of the chord lies κl² s(1 − s)/2 outside of it, with l the chord's length and
+//! κ the curvature, which comes from the directions of both neighbours and the lengths between their middles and the beam's.
+//! A point is thus carried by four nodes with constant weights.
+
+/// Points of a beam for each length of its radius.
+const SPACING: f64 = 1.5;
+
+/// How many points a beam of a length needs, both in mm.
+pub fn points(length: f64, radius: f64) -> usize {
+    (libm::ceil(length / (SPACING * radius)) as usize).max(1)
+}
+
+/// Weights of a point at a share of a beam: of its ends, of the node before it and of the one behind it. Lengths of the beam before,
+/// of the beam and of the one behind, mm.
+pub fn weights([before, length, behind]: [f64; 3], share: f64) -> [f64; 4] {
+    // height over the chord, for each radian between the neighbours
+    let rise = 0.5 * length * length * share * (1.0 - share) / (0.5 * before + length + 0.5 * behind);
+    let (p, q) = (rise / before, rise / behind);
+    [1.0 - share + p, share + q, -p, -q]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_of_a_polygon_lie_on_its_circle() {
+        let angle: f64 = 0.2;
+        let node = |i: f64| [f64::cos(i * angle), f64::sin(i * angle)];
+        let length = 2.0 * f64::sin(0.5 * angle);
+        for share in [0.1, 0.5, 0.8] {
+            let w = weights([length; 3], share);
+            let nodes = [node(0.0), node(1.0), node(-1.0), node(2.0)];
+            let at = [0, 1].map(|k| (0..4).map(|a| w[a] * nodes[a][k]).sum::<f64>());
+            // the chord's middle is 0.005 inside
+            assert!((at[0].hypot(at[1]) - 1.0).abs() < 1e-4);
+            assert!((w.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn points_are_at_most_one_and_a_half_radii_apart() {
+        assert_eq!([0.1, 0.15, 0.22, 0.39].map(|length| points(length, 0.1)), [1, 1, 2, 3]);
+    }
+}
