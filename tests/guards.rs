@@ -113,7 +113,7 @@ fn bodies_that_run_through_each_other() {
 
 #[test]
 fn more_bodies_in_one_place_than_tables_can_hold() {
-    let blocks: Vec<Value> = (0..20).map(|i| cube(&format!("cube {i}"), [0.01 * f64::from(i), 0.0, 0.0])).collect();
+    let blocks: Vec<Value> = (0..100).map(|i| cube(&format!("cube {i}"), [0.01 * f64::from(i), 0.0, 0.0])).collect();
     let guard = stopped(&mut start(&scene(json!(blocks), json!({}), json!({})), F32), 1e-3);
     assert_eq!(guard.cause, "contact overflow");
     assert!(guard.culprit.contains("most crowded: node ") && guard.culprit.contains(" (cube "), "{guard}");
