@@ -9,7 +9,7 @@ use tricot::case::domain::Domain;
 use tricot::case::read::Loaded;
 use tricot::case::steps::Precision::{self, F32, F64};
 use tricot::contact::EMPTY;
-use tricot::contact::penalty::MADE;
+use tricot::contact::candidates::MADE;
 use tricot::fabric;
 use tricot::kernel::shader::Text;
 use tricot::mesh::Mesh;
@@ -190,8 +190,6 @@ fn a_scene_without_an_effect_has_no_trace_of_it() {
                 "stress sums",
                 "rate()",
                 "params.period",
-                "wrap_of",
-                "is_closed",
                 "stage total kinetic energy",
                 "row.gradient_xx;",
                 "fibre lines: let v = rest + apply(gradient()",

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use tricot::backend::Backend;
 use tricot::backend::cpu::Cpu;
 use tricot::case::steps::Precision::F64;
-use tricot::contact::{found, penalty, status};
+use tricot::contact::{found, status, sums};
 use tricot::fabric;
 use tricot::kernel::buffer::Buffer;
 use tricot::kernel::lane::Isa;
@@ -100,8 +100,8 @@ impl Scene {
     fn seen(&self, sums: Buffer, force: Buffer, moved: &[[f64; 3]]) -> Seen {
         let mesh = &self.simulation.mesh;
         let (nodes, first) = (mesh.nodes.len(), mesh.first_thread_node());
-        let row = penalty::sums(false, false);
-        let energies = self.cpu.scalars(sums).chunks_exact(row).map(|sums| sums[penalty::SUM_ENERGY]).collect();
+        let row = sums::sums(false, false);
+        let energies = self.cpu.scalars(sums).chunks_exact(row).map(|sums| sums[sums::SUM_ENERGY]).collect();
         let quanta = self.cpu.ints(force);
         let of = |node: usize| [0, 1, 2].map(|k| f64::from(quanta[node + k * nodes]) * self.quantum());
         let forces = (first..nodes).step_by(2).map(|n| [0, 1, 2].map(|k| of(n)[k] + of(n + 1)[k])).collect();

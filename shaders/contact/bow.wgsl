@@ -19,12 +19,6 @@ struct Piece {
     now: array<vec3<f32>, 2>,
 }
 
-// From the middle of a beam to that of its piece, in the reference and now, mm.
-struct Bow {
-    reference: vec3<f32>,
-    current: vec3<f32>,
-}
-
 fn shares_of(beam: u32) -> vec4<f32> {
     let at = SHARES_OF * beam;
     return vec4<f32>(shares[at], shares[at + 1u], shares[at + 2u], shares[at + 3u]);
@@ -45,13 +39,6 @@ fn piece(beam: u32) -> Piece {
     let rest = piece_ends(share, before.reference, own.reference, behind.reference);
     let change = piece_ends(share, before.change, own.change, behind.change);
     return Piece(rest, array<vec3<f32>, 2>(rest[0] + change[0], rest[1] + change[1]));
-}
-
-fn bow(beam: u32) -> Bow {
-    let line = piece(beam);
-    let own = vector(beam);
-    let rest = (line.rest[0] + line.rest[1] - own.reference) * 0.5;
-    return Bow(rest, (line.now[0] + line.now[1] - (own.reference + own.change)) * 0.5);
 }
 
 // Whether two beams are the same thread here and closer along it than `arc` after so many turns of a closed thread.

@@ -18,7 +18,7 @@ fn clear(cell: u32) {
 #define STATUS
 #define BEFORE
 #endif
-#include "contact/face"
+#include "contact/surface"
 #if fill_beams
 #include "contact/bow"
 #endif
@@ -225,10 +225,8 @@ fn fill_slabs(item: u32) {
 fn fill_beams(item: u32) {
     let back = inverse();
     let beam = item - params.slabs;
-    let along = vector(beam);
-    let aside = bow(beam).current;
-    var bounds = grow(no_bounds(), back, aside);
-    bounds = grow(bounds, back, aside + (along.reference + along.change));
+    let line = piece(beam).now;
+    var bounds = grow(grow(no_bounds(), back, line[0]), back, line[1]);
     let first = ends[2u * beam];
     bounds = moves(moves(bounds, motion(first)), motion(ends[2u * beam + 1u]));
     put(item, first, back, bounds, 2.0 * params.thread_radius + params.skin);

@@ -53,7 +53,6 @@ struct Params {
     thread_radius: f32,
     thread_thread: f32,
     self_arc: f32,
-    beside: f32,
     depth: f32,
     apart: u32,
 }

@@ -1,51 +1,16 @@
 // Penalty contact of points with the closed surfaces of yarns, every step: points along the beams of a thread with THREAD, else the
 // nodes of yarn surfaces. The energy is in the twin.
-// What includes this for `add_sum` and `add_virial` defines PRESS and binds `sums`.
 
-#if penalty
-#define PRESS
 #define STATUS
 #define PAIRS
 #define FACES
 #define POINTS
 #define VELOCITY
+#include "contact/surface"
 #include "contact/face"
-#endif
-
-#if PRESS
-// Sums of a point or a beam, and where the stress starts among them.
-const SUM_ENERGY: u32 = 0u;
-const SUM_DAMPING: u32 = 1u;
-const SUM_RADIUS: u32 = 2u;
+#include "contact/sums"
 #if FRICTION
 #include "contact/friction"
-const SUM_FRICTION: u32 = 3u;
-const SUM_SLIP: u32 = 4u;
-const SUM_VIRIAL: u32 = 5u;
-#else
-const SUM_VIRIAL: u32 = 3u;
-#endif
-#if PERIODIC
-const SUMS: u32 = SUM_VIRIAL + 9u;
-#else
-const SUMS: u32 = SUM_VIRIAL;
-#endif
-
-// Adds to a sum of an item.
-fn add_sum(item: u32, sum: u32, value: f32) {
-    sums[SUMS * item + sum] = sums[SUMS * item + sum] + value;
-}
-
-#if PERIODIC
-// Subtracts force ⊗ ΔX from the sum of an item that makes the homogenised stress.
-fn add_virial(item: u32, push: vec3<f32>, apart: vec3<f32>) {
-    for (var i = 0u; i < 3u; i++) {
-        for (var j = 0u; j < 3u; j++) {
-            add_sum(item, SUM_VIRIAL + 3u * i + j, -(push[i] * apart[j]));
-        }
-    }
-}
-#endif
 #endif
 
 #if ROOT
@@ -73,6 +38,8 @@ const INNER: u32 = 2u;
 const GAPS: u32 = 3u;
 // More than rounding moves a gap, mm.
 const GAP_ROUNDING: f32 = 1e-6;
+// Share of their distances by which two places that are equally near may differ.
+const TIE: f32 = 1e-4;
 // Numbers of a touch.
 const NORMAL: u32 = 0u;
 const DAMPED: u32 = 1u;
@@ -89,6 +56,11 @@ const KIND: u32 = 0u;
 const KIND: u32 = 1u;
 #endif
 
+// How much farther than what is nearest, at a `distance`, a face may be and still count as equally near, with room, mm.
+fn margin(distance: f32) -> f32 {
+    return 2.0 * TIE * distance + GAP_ROUNDING;
+}
+
 // A point that may touch something.
 struct Point {
     item: u32,
@@ -100,22 +72,40 @@ struct Point {
     size: f32,
 }
 
-// A face, its closest point, and what acts on its corners, N.
-struct Pressed {
+// Where the surface of a body is nearest to a point: the entry of its face, unit vector from there, distance, height above the face.
+struct Nearest {
     found: bool,
-    nodes: vec4<u32>,
-    reference: array<vec3<f32>, 4>,
-    point: Closest,
-    pull: array<vec3<f32>, 4>,
+    entry: u32,
+    away: vec3<f32>,
+    distance: f32,
+    height: f32,
 }
 
-// What a body does to a point: where its surface is nearest; resultant, energy and number of the features that push.
+// How a face, with the edges and corners that it owns, pushes a point: what acts on its corners; energy, sum of forces, features.
+struct Push {
+    pull: array<vec3<f32>, 4>,
+    energy: f32,
+    pressing: f32,
+    count: f32,
+}
+
+// What a body does to a point, see the twin.
 struct Pushed {
-    nearest: Pressed,
+    nearest: Nearest,
     push: vec3<f32>,
     energy: f32,
     pressing: f32,
     features: f32,
+    shared_force: f32,
+    motion: vec3<f32>,
+    apart: vec3<f32>,
+    inverse_mass: f32,
+}
+
+// What damping and friction do to a point, N, and a bound of all its stiffness against a body, N/mm.
+struct Rubbed {
+    force: vec3<f32>,
+    rows: f32,
 }
 
 // What acts on a point, in quanta.
@@ -123,68 +113,97 @@ var<private> own: vec3<i32>;
 
 // Whether a place is nearer than what is known.
 fn is_nearer(pushed: ptr<function, Pushed>, point: Closest) -> bool {
-    let known = (*pushed).nearest.point;
-    let tie = known.distance * 1e-4 + 1e-7;
+    let known = (*pushed).nearest;
+    let tie = known.distance * TIE + 0.1 * GAP_ROUNDING;
     let apart = point.distance - known.distance;
-    return !(*pushed).nearest.found || apart < -tie || apart <= tie && abs(point.height) > abs(known.height);
+    return !known.found || apart < -tie || apart <= tie && abs(point.height) > abs(known.height);
 }
 
 // Whether the point is behind the nearest place that is known, no deeper than what is pushed out.
 fn is_behind(pushed: ptr<function, Pushed>) -> bool {
-    let point = (*pushed).nearest.point;
-    return (*pushed).nearest.found && point.height < 0.0 && point.distance < params.depth;
+    let known = (*pushed).nearest;
+    return known.found && known.height < 0.0 && known.distance < params.depth;
 }
 
 // Distance from which on a face cannot change what is nearest, mm.
 fn beyond(pushed: ptr<function, Pushed>) -> f32 {
-    return (*pushed).nearest.point.distance * (1.0 - 2e-4) - 2e-7;
+    return (*pushed).nearest.distance * (1.0 - 2.0 * TIE) - 0.2 * GAP_ROUNDING;
 }
 
-// Adds an elastic force of a feature and its energy on the point; notes its opposite on the corners of its face.
-fn add_push(
-    pushed: ptr<function, Pushed>,
-    pulls: ptr<function, array<vec3<f32>, 4>>,
-    weights: vec4<f32>,
-    away: vec3<f32>,
-    push: f32,
-    energy: f32,
-) {
-    (*pushed).push = away * push + (*pushed).push;
-    (*pushed).energy = (*pushed).energy + energy;
-    (*pushed).pressing = (*pushed).pressing + push;
+// Adds a force on the point, `away` from a place by weights of the corners, and its energy.
+fn add_push(push: ptr<function, Push>, weights: vec4<f32>, away: vec3<f32>, size: f32, energy: f32) {
+    (*push).energy = (*push).energy + energy;
+    (*push).pressing = (*push).pressing + size;
     for (var a = 0u; a < 4u; a++) {
-        (*pulls)[a] = away * -(push * weights[a]) + (*pulls)[a];
+        (*push).pull[a] = away * -(size * weights[a]) + (*push).pull[a];
     }
 }
 
 // Adds an edge or a corner within the radius, with its sign in the sum.
-fn add_border(
-    pushed: ptr<function, Pushed>,
-    pulls: ptr<function, array<vec3<f32>, 4>>,
-    here: Point,
-    border: OnEdge,
-    side: f32,
-) {
+fn add_border(push: ptr<function, Push>, here: Point, border: OnEdge, side: f32) {
     if border.square < here.radius * here.radius {
         let distance = sqrt(border.square);
         let depth = here.radius - distance;
-        let push = side * (here.stiff * depth);
+        let size = side * (here.stiff * depth);
         let away = border.offset * (1.0 / max(distance, 1e-12));
-        add_push(pushed, pulls, border.weights, away, push, 0.5 * push * depth);
-        (*pushed).features = (*pushed).features + max(side, 0.0);
+        add_push(push, border.weights, away, size, 0.5 * size * depth);
+        (*push).count = (*push).count + max(side, 0.0);
     }
 }
 
+// How a face pushes, by its marks.
+fn push_of_face(here: Point, q: array<vec3<f32>, 4>, bits: u32, point: Closest) -> Push {
+    var push = Push(array<vec3<f32>, 4>(), 0.0, 0.0, 0.0);
+    let depth = here.radius - point.distance;
+    if !(depth > 0.0) {
+        return push;
+    }
+    let size = here.stiff * depth;
+    add_push(&push, point.weights, point.away, size, 0.5 * size * depth);
+    push.count = 1.0;
+    for (var a = 0u; a < 4u; a++) {
+        if (bits >> a & 1u) == 1u {
+            add_border(&push, here, on_edge(q, a), -1.0);
+        }
+        if (bits >> (4u + a) & 1u) == 1u {
+            add_border(&push, here, on_corner(q, a), 1.0);
+        }
+    }
+    return push;
+}
+
+// Force and energy that push a point out that is inside and so far from the surface.
+fn out_force(here: Point, depth: f32) -> f32 {
+    return here.stiff * ((here.radius + depth) + max(here.radius - depth, 0.0));
+}
+
+fn out_energy(here: Point, depth: f32) -> f32 {
+    let whole = here.radius + depth;
+    let outside = max(here.radius - depth, 0.0);
+    return 0.5 * here.stiff * (whole * whole - outside * outside);
+}
+
+// Adds what pushes a point out that is inside; returns how deep it is, mm.
+fn push_out(here: Point, pushed: ptr<function, Pushed>) -> f32 {
+    let known = (*pushed).nearest;
+    let size = out_force(here, known.distance);
+    (*pushed).push = known.away * -size + (*pushed).push;
+    (*pushed).energy = (*pushed).energy + out_energy(here, known.distance);
+    (*pushed).pressing = (*pushed).pressing + size;
+    (*pushed).features = (*pushed).features + 1.0;
+    return known.distance;
+}
+
 // Adds forces to the corners of a face, and their opposite to what acts on the point, as integers whose sum is zero.
-fn pull(item: u32, face: Pressed) {
-    var pulls = face.pull;
-    var places = face.reference;
+fn pull(item: u32, around: Corners, pulled: array<vec3<f32>, 4>) {
+    var pulls = pulled;
+    var places = around.reference;
     let plane = arrayLength(&forces) / 3u;
     let sum = ((pulls[0] + pulls[1]) + (pulls[2] + pulls[3])) / params.force_quantum;
     let fits = is_finite(sum.x) && is_finite(sum.y) && is_finite(sum.z);
     if !fits || any(abs(sum) >= vec3<f32>(134217728.0)) {
         atomicOr(&status[FLAGS], FORCE_RANGE);
-        atomicStore(&status[CULPRIT], face.nodes[0]);
+        atomicStore(&status[CULPRIT], around.nodes[0]);
         return;
     }
     var rest = vec3<i32>(to_i32(sum.x), to_i32(sum.y), to_i32(sum.z));
@@ -197,7 +216,7 @@ fn pull(item: u32, face: Pressed) {
         }
         rest = rest - part;
         for (var k = 0u; k < 3u; k++) {
-            atomicAdd(&forces[face.nodes[a] + k * plane], part[k]);
+            atomicAdd(&forces[around.nodes[a] + k * plane], part[k]);
         }
 #if PERIODIC
         add_virial(item, pulls[a], places[a]);
@@ -205,7 +224,7 @@ fn pull(item: u32, face: Pressed) {
     }
 }
 
-// Adds what a face does to a point, with the edges and corners that it owns; returns the gap, or as much as is sure to be left.
+// Adds what a face does to a point; returns the gap, or as much as is sure to be left of it.
 fn face_push(here: Point, entry: u32, most: f32, pushed: ptr<function, Pushed>) -> f32 {
     let seen = of_key(entry);
     let around = corners(seen.body, seen.image, here.base, here.aside);
@@ -216,71 +235,57 @@ fn face_push(here: Point, entry: u32, most: f32, pushed: ptr<function, Pushed>) 
         return sure;
     }
     let point = closest(q, shape);
-    let gap = point.distance - here.radius;
-    let pushes = gap < 0.0;
-    var pulls = array<vec3<f32>, 4>();
-    if pushes {
-        let bits = marks(seen.body);
-        let push = here.stiff * -gap;
-        add_push(pushed, &pulls, point.weights, point.away, push, -0.5 * push * gap);
-        (*pushed).features = (*pushed).features + 1.0;
-        for (var a = 0u; a < 4u; a++) {
-            if (bits >> a & 1u) == 1u {
-                add_border(pushed, &pulls, here, on_edge(q, a), -1.0);
-            }
-            if (bits >> (4u + a) & 1u) == 1u {
-                add_border(pushed, &pulls, here, on_corner(q, a), 1.0);
-            }
-        }
+    let push = push_of_face(here, q, marks(seen.body), point);
+    let pulls = push.pull;
+    (*pushed).push = (*pushed).push + ((pulls[0] + pulls[1]) + (pulls[2] + pulls[3])) * -1.0;
+    (*pushed).energy = (*pushed).energy + push.energy;
+    (*pushed).pressing = (*pushed).pressing + push.pressing;
+    (*pushed).features = (*pushed).features + push.count;
+    let nearer = is_nearer(pushed, point);
+    if nearer {
+        (*pushed).nearest = Nearest(true, entry, point.away, point.distance, point.height);
     }
-    let face = Pressed(true, around.nodes, around.reference, point, pulls);
-    if is_nearer(pushed, point) {
-        let known = (*pushed).nearest;
-        (*pushed).nearest = face;
-        if known.found && known.point.distance < here.radius {
-            pull(here.item, known);
+    let gap = point.distance - here.radius;
+    let size = here.stiff * max(-gap, 0.0);
+    let alone = !((*pushed).shared_force > 0.0);
+    if size > 0.0 || alone && nearer {
+        let share = select(1.0, size, size > 0.0);
+        if alone {
+            (*pushed).motion = vec3<f32>(0.0);
+            (*pushed).apart = vec3<f32>(0.0);
+            (*pushed).inverse_mass = 0.0;
         }
-    } else if pushes {
-        pull(here.item, face);
+        var places = around.reference;
+        for (var a = 0u; a < 4u; a++) {
+            let node = around.nodes[a];
+            let weight = point.weights[a];
+            (*pushed).motion = velocity_at(node) * (share * weight) + (*pushed).motion;
+            (*pushed).apart = places[a] * (share * weight) + (*pushed).apart;
+            (*pushed).inverse_mass = (*pushed).inverse_mass + share * (weight * weight / mass[node]);
+        }
+        (*pushed).shared_force = (*pushed).shared_force + size;
     }
     return gap;
 }
 
 // What a body does to a point, by its entries and their gaps: those that are no larger than `most` are looked at. Returns the least.
 fn look(here: Point, list: u32, first_gap: u32, part: vec2<u32>, most: f32, pushed: ptr<function, Pushed>) -> f32 {
-    for (var i = part.x; i < part.y; i++) {
-        if gaps[first_gap + i] <= most {
-            gaps[first_gap + i] = face_push(here, near[list + i], most, pushed);
-        }
-    }
-    // it is inside only if no other face is nearer
-    let looks = is_behind(pushed);
     var least = params.skin;
-    for (var i = part.x; i < part.y; i++) {
-        let far = beyond(pushed) - here.radius;
-        if looks && gaps[first_gap + i] < far {
-            gaps[first_gap + i] = face_push(here, near[list + i], far, pushed);
+    for (var round = 0u; round < 2u; round++) {
+        // a point that seems to be inside is so only if no other face is nearer
+        if round == 1u && !is_behind(pushed) {
+            break;
         }
-        least = min(least, gaps[first_gap + i]);
+        least = params.skin;
+        for (var i = part.x; i < part.y; i++) {
+            let limit = select(beyond(pushed) - here.radius, most, round == 0u);
+            if (gaps[first_gap + i] > most) == (round == 1u) && gaps[first_gap + i] <= limit {
+                gaps[first_gap + i] = face_push(here, near[list + i], limit, pushed);
+            }
+            least = min(least, gaps[first_gap + i]);
+        }
     }
     return least;
-}
-
-// Pushes a point out of a body that it is inside of; returns how deep it is, mm.
-fn push_out(here: Point, pushed: ptr<function, Pushed>) -> f32 {
-    if !is_behind(pushed) {
-        return 0.0;
-    }
-    let point = (*pushed).nearest.point;
-    var pulls = (*pushed).nearest.pull;
-    let depth = point.distance;
-    let whole = here.radius + depth;
-    let outside = max(here.radius - depth, 0.0);
-    let energy = 0.5 * here.stiff * (whole * whole - outside * outside);
-    add_push(pushed, &pulls, point.weights, point.away * -1.0, here.stiff * (whole + outside), energy);
-    (*pushed).features = (*pushed).features + 1.0;
-    (*pushed).nearest.pull = pulls;
-    return depth;
 }
 
 // Viscosity that damps a spring between masses of joint inverse `inverse_mass`.
@@ -288,31 +293,24 @@ fn viscosity(stiff: f32, inverse_mass: f32) -> f32 {
     return params.damping * 2.0 * sqrt(stiff / inverse_mass);
 }
 
-// What damping and friction take, once for a point and a body, where the surface is nearest: a touch goes on.
-fn rub(here: Point, pushed: ptr<function, Pushed>, touch: u32) {
-    let face = (*pushed).nearest;
-    var places = face.reference;
-    let weights = face.point.weights;
+// What damping and friction do, once for a point and a body: against the mean motion of the faces that push, by their forces.
+fn rub(here: Point, pushed: ptr<function, Pushed>, touch: u32) -> Rubbed {
     let elapsed = row.dt_mid + row.dt_mid - row.dt;
-    var motion = vec3<f32>(0.0);
-    var apart = vec3<f32>(0.0);
-    var inverse_mass = 0.0;
+    let share = select(1.0, (*pushed).shared_force, (*pushed).shared_force > 0.0);
+    var motion = (*pushed).motion * (-1.0 / share);
+    var inverse_mass = (*pushed).inverse_mass / share;
     for (var a = 0u; a < CARRIED_BY; a++) {
         let node = carried_by(here.item, a);
         let weight = points[POINT * here.item + a];
         motion = velocity_at(node) * weight + motion;
         inverse_mass = inverse_mass + weight * weight / mass[node];
     }
-    for (var a = 0u; a < 4u; a++) {
-        motion = velocity_at(face.nodes[a]) * -weights[a] + motion;
-        apart = places[a] * -weights[a] + apart;
-        inverse_mass = inverse_mass + weights[a] * weights[a] / mass[face.nodes[a]];
-    }
 #if PERIODIC
+    let apart = (*pushed).apart * (-1.0 / share);
     motion = motion + apply(rate(), apart);
 #endif
     let size = norm((*pushed).push);
-    var normal = face.point.away;
+    var normal = (*pushed).nearest.away;
     if size > 0.0 {
         normal = (*pushed).push * (1.0 / size);
     }
@@ -320,11 +318,11 @@ fn rub(here: Point, pushed: ptr<function, Pushed>, touch: u32) {
     let viscous = viscosity(here.stiff, inverse_mass);
     let pressing = max(size - viscous * approach, 0.0);
     // over the way since the positions before, with the mean of the forces before and now
-    let damped = size - pressing;
-    add_sum(here.item, SUM_DAMPING, 0.5 * (touches[touch + DAMPED] + damped) * approach * elapsed);
+    let drag = size - pressing;
+    add_sum(here.item, SUM_DAMPING, 0.5 * (touches[touch + DAMPED] + drag) * approach * elapsed);
     touches[touch + NORMAL] = pressing;
-    touches[touch + DAMPED] = damped;
-    var push = normal * -damped;
+    touches[touch + DAMPED] = drag;
+    var rubbing = normal * -drag;
 #if FRICTION
     let tangential = here.stiff * params.tangential;
     let limit = params.friction * pressing;
@@ -336,21 +334,40 @@ fn rub(here: Point, pushed: ptr<function, Pushed>, touch: u32) {
     touches[touch + ELASTIC + 1u] = slid.elastic.y;
     touches[touch + ELASTIC + 2u] = slid.elastic.z;
     (*pushed).energy = (*pushed).energy + 0.5 * tangential * dot(slid.elastic, slid.elastic);
-    push = slid.elastic * -tangential + push;
+    rubbing = slid.elastic * -tangential + rubbing;
 #endif
-    var pulls = face.pull;
-    for (var a = 0u; a < 4u; a++) {
-        pulls[a] = push * -weights[a] + pulls[a];
-    }
-    (*pushed).nearest.pull = pulls;
     let rows = (1.0 + here.size) * (here.stiff * (*pushed).features + viscous * (2.0 / row.dt));
     let stiffness_quanta = rows / params.stiffness_quantum;
-    for (var a = 0u; a < 4u; a++) {
-        atomicAdd(&stiffness[face.nodes[a]], to_i32(stiffness_quanta * abs(weights[a])));
-    }
     for (var a = 0u; a < CARRIED_BY; a++) {
         let node = carried_by(here.item, a);
         atomicAdd(&stiffness[node], to_i32(stiffness_quanta * abs(points[POINT * here.item + a])));
+    }
+    return Rubbed(rubbing, rows);
+}
+
+// Adds what a face does to a point, which may be `inside` behind the nearest one, to the nodes, with its share of what damping and
+// friction do.
+fn press(here: Point, entry: u32, inside: bool, pushed: ptr<function, Pushed>, rubbed: Rubbed) {
+    let seen = of_key(entry);
+    let around = corners(seen.body, seen.image, here.base, here.aside);
+    let q = around.current;
+    let point = closest(q, patch_of(q));
+    var push = push_of_face(here, q, marks(seen.body), point);
+    let is_nearest = entry == (*pushed).nearest.entry;
+    if inside && is_nearest {
+        add_push(&push, point.weights, point.away * -1.0, out_force(here, point.distance), out_energy(here, point.distance));
+    }
+    var share = select(0.0, 1.0, is_nearest);
+    if (*pushed).shared_force > 0.0 {
+        share = here.stiff * max(here.radius - point.distance, 0.0) / (*pushed).shared_force;
+    }
+    for (var a = 0u; a < 4u; a++) {
+        push.pull[a] = rubbed.force * -(share * point.weights[a]) + push.pull[a];
+    }
+    pull(here.item, around, push.pull);
+    let stiffness_quanta = rubbed.rows * share / params.stiffness_quantum;
+    for (var a = 0u; a < 4u; a++) {
+        atomicAdd(&stiffness[around.nodes[a]], to_i32(stiffness_quanta * abs(point.weights[a])));
     }
 }
 
@@ -387,32 +404,28 @@ fn place_of(item: u32, body: u32, begins: bool) -> u32 {
     return free;
 }
 
-// What a body has done to a point: damping, friction, and what is left of the touch. Returns how deep the point is inside.
-fn settle(here: Point, body: u32, pushed: ptr<function, Pushed>, touching: ptr<function, bool>) -> f32 {
-    let depth = push_out(here, pushed);
-    let begins = (*pushed).features > 0.0;
-    let slot = place_of(here.item, body, begins);
+// Damping, friction, and what is left of a body's touch; whether it still touches.
+fn settle(here: Point, body: u32, depth: f32, pushed: ptr<function, Pushed>, rubbed: ptr<function, Rubbed>) -> bool {
+    let touching = (*pushed).features > 0.0;
+    let slot = place_of(here.item, body, touching);
     if slot == params.slots {
-        return depth;
+        return false;
     }
     let touch = TOUCH * (params.slots * here.item + slot);
     let place = (MADE + params.slots) * here.item + MADE + slot;
-    rub(here, pushed, touch);
-    pull(here.item, (*pushed).nearest);
+    *rubbed = rub(here, pushed, touch);
     add_sum(here.item, SUM_RADIUS, (*pushed).pressing * here.full_radius * row.radius_increment);
-    add_sum(here.item, SUM_ENERGY, (*pushed).energy);
-    if begins {
-        *touching = true;
-        keys[place] = body;
-        let outside = max(here.radius - (*pushed).nearest.point.distance, 0.0);
-        raise(PENETRATION + KIND, select(outside, here.radius + depth, depth > 0.0));
-    } else {
+    if !touching {
         keys[place] = EMPTY;
         for (var i = 0u; i < TOUCH; i++) {
             touches[touch + i] = 0.0;
         }
+        return false;
     }
-    return depth;
+    keys[place] = body;
+    let outside = max(here.radius - (*pushed).nearest.distance, 0.0);
+    raise(PENETRATION + KIND, select(outside, here.radius + depth, depth > 0.0));
+    return true;
 }
 
 fn penalty(item: u32) {
@@ -443,7 +456,8 @@ fn penalty(item: u32) {
     let radius = full_radius * row.radius;
     let here = Point(item, carried_by(item, 0u), point_of(item), stiff, full_radius, radius, size);
     // a point that was inside is no deeper than this now
-    let most = gaps[first_gap + INNER] + closing + GAP_ROUNDING;
+    let deepest = gaps[first_gap + INNER] + closing;
+    let most = deepest + margin(radius + deepest);
     var least = params.skin;
     var inner = 0.0;
     var touching = false;
@@ -467,9 +481,24 @@ fn penalty(item: u32) {
         }
         var pushed = Pushed();
         least = min(least, look(here, list, first_gap + GAPS, vec2<u32>(start, end), most, &pushed));
-        inner = max(inner, settle(here, body, &pushed, &touching));
+        let inside = is_behind(&pushed);
+        var depth = 0.0;
+        if inside {
+            depth = push_out(here, &pushed);
+        }
+        inner = max(inner, depth);
+        var rubbed = Rubbed();
+        if settle(here, body, depth, &pushed, &rubbed) {
+            touching = true;
+            for (var i = start; i < end; i++) {
+                if gaps[first_gap + GAPS + i] < 0.0 || near[list + i] == pushed.nearest.entry {
+                    press(here, near[list + i], inside, &pushed, rubbed);
+                }
+            }
+        }
+        add_sum(item, SUM_ENERGY, pushed.energy);
     }
-    gaps[first_gap + LEAST] = least - inner - GAP_ROUNDING;
+    gaps[first_gap + LEAST] = least - inner - margin(radius + inner);
     gaps[first_gap + CLOSED] = 0.0;
     gaps[first_gap + INNER] = inner;
     if any(own != vec3<i32>(0)) {

@@ -6,12 +6,14 @@
 #define BOXES
 #endif
 #if force
-#define PRESS
 #define PAIRS
 #define VELOCITY
+#include "contact/sums"
+#if FRICTION
+#include "contact/friction"
+#endif
 #endif
 #include "contact/grid"
-#include "contact/penalty"
 #include "contact/bow"
 #include "contact/segments"
 
@@ -60,10 +62,8 @@ struct Cells {
 fn cells_of(node: vec2<f32>, line: Piece, back: Inverse) -> Cells {
     let a = node + pull_back(back, line.now[0]);
     let b = node + pull_back(back, line.now[1]);
-    // lines leave the boxes of their items by so much
-    let room = params.beside * stretch(back);
-    let low = min(a, b) - room;
-    let high = max(a, b) + room;
+    let low = min(a, b);
+    let high = max(a, b);
     return Cells(cells(0u, low.x, high.x), cells(1u, low.y, high.y));
 }
 

@@ -72,22 +72,6 @@ impl<R: Real> Bows<'_, R> {
         Piece { rest, now: [add(rest[0], change[0]), add(rest[1], change[1])] }
     }
 
-    /// From the middle of a beam to that of its piece, in the reference and now, mm.
-    #[inline(always)]
-    pub fn bow<const PERIODIC: bool>(
-        &self,
-        beams: &[R],
-        ends: &[u32],
-        beam: usize,
-        w: &Displacements<R>,
-        gradient: &[[R; 3]; 3],
-    ) -> (Vector<R>, Vector<R>) {
-        let Piece { rest, now } = self.piece::<PERIODIC>(beams, ends, beam, w, gradient);
-        let (own, change) = beam2::vector::<_, PERIODIC>(beams, ends, beam, w, gradient);
-        let mean = |ends: [Vector<R>; 2], own| scale(sub(add(ends[0], ends[1]), own), R::from_f64(0.5));
-        (mean(rest, own), mean(now, add(own, change)))
-    }
-
     /// The four nodes on which a piece hangs.
     #[inline(always)]
     pub fn nodes(&self, ends: &[u32], beam: usize) -> [usize; 4] {

@@ -4,9 +4,8 @@
 //! items, and a body's faces follow each other. It holds no state but how often it was made: what touches is known by its body.
 //! Carriers near nothing that has moved relative to them (see [`super::travel`]) keep their lists.
 
-use super::face::{Surface, entry, of_coded};
 use super::grid::{BOX, Moved, SLAB, absolute, cell_index, cells, has_moved, inverse, motion, pull_back};
-use super::penalty::{CARRIED, MADE, POINT};
+use super::surface::{CARRIED, POINT, Surface, entry, of_coded};
 use super::{EMPTY, Params, found, of_key, status};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
@@ -19,6 +18,9 @@ use std::sync::atomic::Ordering;
 
 /// Integers of a carrier: its first point, how many it has, and its own body, or [`EMPTY`] for a thread.
 pub const CARRIER: usize = 3;
+/// Integers before the entries of a list, and before the keys of the bodies that a point touches: how often the list was made, and
+/// how often it had been when the point last looked.
+pub const MADE: usize = 1;
 
 const CARRIERS: usize = 0;
 const NODES: usize = 1;

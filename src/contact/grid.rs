@@ -6,15 +6,14 @@
 //! Boxes tell how far their items have moved since everything was last searched (see [`super::travel`]).
 
 use super::bow::Bows;
-use super::face::{FACE, Surface, of_coded};
+use super::surface::{FACE, Surface, of_coded};
 use super::{Params, status};
-use crate::elements::beam2;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::QUANTUM;
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, Own, Scatter};
-use crate::kernel::vector::add;
+
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -319,11 +318,9 @@ impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
         let reach = L::Scalar::from_f64(f64::from(2.0 * grid.params.thread_radius + grid.params.skin));
         for item in items {
             let beam = item - grid.params.slabs as usize;
-            let (d, change) = beam2::vector::<_, PERIODIC>(beams, ends, beam, &displacement, &io.row.gradient);
-            let bow = bows.bow::<PERIODIC>(beams, ends, beam, &displacement, &io.row.gradient).1;
+            let piece = bows.piece::<PERIODIC>(beams, ends, beam, &displacement, &io.row.gradient);
             let mut bounds = Bounds::new();
-            bounds.grow(&inverse, bow);
-            bounds.grow(&inverse, add(bow, add(d, change)));
+            piece.now.into_iter().for_each(|end| bounds.grow(&inverse, end));
             let (first, last) = (ends[2 * beam] as usize, ends[2 * beam + 1] as usize);
             for node in [first, last] {
                 bounds.moved.add(motion(io, [QUANTA, REMAINDER, BEAM_BEFORE], node));

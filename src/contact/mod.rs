@@ -2,7 +2,7 @@
 //!
 //! A scene has the kinds of pairs that it calls for, each with stages of its own, and friction only if something rubs.
 //!
-//! Yarns have closed surfaces of `face`s. `grid` sorts slabs of faces and beams into cells, `candidates` lists the faces near each
+//! Yarns have a closed `surface` of `face`s. `grid` sorts slabs of faces and beams into cells, `candidates` lists the faces near each
 //! beam and each node of a yarn, and every step `penalty` adds the forces of the listed faces on the points that these carry,
 //! which `arc` lays along beams. `threads` does the same for pairs of beams: `bow` lays their lines, and `segments` integrates
 //! along them. Forces and contact stiffness are added as integers, so
@@ -17,6 +17,8 @@ pub mod grid;
 pub mod penalty;
 pub mod segments;
 pub mod slip;
+pub mod sums;
+pub mod surface;
 pub mod threads;
 pub mod tie;
 pub mod travel;
@@ -64,8 +66,6 @@ pub struct Params {
     pub thread_thread: f32,
     /// Arc length within which beams of one thread ignore each other, mm.
     pub self_arc: f32,
-    /// How far the line of a thread may leave the boxes of its beams in the grid, mm.
-    pub beside: f32,
     /// Deepest penetration of a surface node that is still pushed out, mm.
     pub depth: f32,
     /// How far bodies may have moved along an axis relative to each other before candidates are searched again, quanta.

@@ -17,12 +17,16 @@
 //! it out. On the surface both parts of the energy meet. The nodes of yarns have no radius, and of the energy ½ k d² is left.
 //!
 //! What a pair loses is not of the energy: damping of the approach and friction act once for each point and body, along
-//! and across the resultant, where the surface is nearest.
+//! and across the resultant, against the mean motion of the faces that push, each by its force: a choice among the walls of a valley
+//! would jump from step to step.
 //!
 //! Every face of a point's list has a gap counter. It is looked at again once bodies can have closed the gap.
 
-use super::face::{Closest, Corners, OnEdge, Patch, Surface, closest, of_coded, on_corner, on_edge};
+use super::candidates::MADE;
+use super::face::{Closest, OnEdge, Patch, closest, on_corner, on_edge};
 use super::friction::slide;
+use super::sums::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
+use super::surface::{CARRIED, Corners, POINT, Surface, of_coded};
 use super::{EMPTY, Params, add_force, add_stiffness, is_in_range, of_key, status};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
@@ -33,13 +37,6 @@ use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
-/// Integers of a point: up to four coded nodes that carry it; its list of faces.
-pub const CARRIED: usize = 5;
-/// Numbers of a point: weights of its four nodes; penalty, N/mm; radius, mm.
-pub const POINT: usize = 6;
-/// Integers before the entries of a list, and before the keys of the bodies that a point touches: how often the list was made, and
-/// how often it had been when the point last looked.
-pub const MADE: usize = 1;
 /// Numbers before the gaps of a point, mm: the least gap when faces were last looked at; what bodies can have closed of it
 /// since; how deep the point was inside a body, or may have been. Then the gap of every face of the list.
 pub const LEAST: usize = 0;
@@ -48,6 +45,8 @@ pub const INNER: usize = 2;
 pub const GAPS: usize = 3;
 /// More than rounding moves a gap, mm: a face that touches by less than that must not be missed, whenever its gap was last known.
 const GAP_ROUNDING: f64 = 1e-6;
+/// Two places are equally near if their distances differ by no more than this share of them.
+const TIE: f64 = 1e-4;
 /// Numbers of a touch: normal force and its part from damping, N; with friction then the elastic tangential displacement, mm (3).
 pub const NORMAL: usize = 0;
 pub const DAMPED: usize = 1;
@@ -55,24 +54,6 @@ pub const ELASTIC: usize = 2;
 pub const fn touch(friction: bool) -> usize {
     if friction { ELASTIC + 3 } else { ELASTIC }
 }
-/// Sums of a point or a beam: elastic energy now, mJ; over steps, energy lost to contact damping, and work of the growing
-/// radius, mJ.
-pub const SUM_ENERGY: usize = 0;
-pub const SUM_DAMPING: usize = 1;
-pub const SUM_RADIUS: usize = 2;
-/// With friction: energy lost to it, mJ, and slip, mm.
-pub const SUM_FRICTION: usize = 3;
-pub const SUM_SLIP: usize = 4;
-
-/// Where force ⊗ ΔX, N·mm (9), starts in the sums of a periodic scene.
-pub const fn virial(friction: bool) -> usize {
-    if friction { SUM_SLIP + 1 } else { SUM_RADIUS + 1 }
-}
-/// Number of the sums.
-pub const fn sums(friction: bool, periodic: bool) -> usize {
-    virial(friction) + if periodic { 9 } else { 0 }
-}
-
 const NODES: usize = 0;
 const POINTS: usize = 1;
 const FACES: usize = 2;
@@ -105,15 +86,10 @@ fn viscosity<R: Real>(params: &Params, penalty: R, inverse: R) -> R {
     R::from_f64(f64::from(params.damping)) * R::from_f64(2.0) * (penalty / inverse).sqrt()
 }
 
-/// Subtracts force ⊗ ΔX from the nine sums that make the homogenised stress.
+/// How much farther than what is nearest, at a `distance`, a face may be and still count as equally near, with room, mm.
 #[inline(always)]
-pub fn add_virial<R: Real>(sum: &mut [R], force: Vector<R>, apart: Vector<R>) {
-    for i in 0..3 {
-        for j in 0..3 {
-            let v = &mut sum[3 * i + j];
-            *v = *v - force[i] * apart[j];
-        }
-    }
+fn margin<R: Real>(distance: R) -> R {
+    R::from_f64(2.0 * TIE) * distance + R::from_f64(GAP_ROUNDING)
 }
 
 /// What stays of a point from step to step, and its sums.
@@ -165,91 +141,170 @@ struct Point<R, const N: usize> {
     size: R,
 }
 
-/// A face, its closest point, and what acts on its corners, N.
+/// Where the surface of a body is nearest to a point: the entry of its face; unit vector from there; distance, and height above the
+/// face, mm.
 #[derive(Clone, Copy)]
-struct Pressed<R> {
+struct Nearest<R> {
     found: bool,
-    corners: Corners<R>,
-    point: Closest<R>,
+    entry: u32,
+    away: Vector<R>,
+    distance: R,
+    height: R,
+}
+
+/// Force, N, and energy, mJ, that push a point out that is inside and so far from the surface, mm.
+#[inline(always)]
+fn out<R: Real, const N: usize>(at: &Point<R, N>, depth: R) -> (R, R) {
+    let (whole, outside) = (at.radius + depth, (at.radius - depth).max(R::from_f64(0.0)));
+    (at.penalty * (whole + outside), R::from_f64(0.5) * at.penalty * (whole * whole - outside * outside))
+}
+
+/// How a face, with the edges and corners that it owns, pushes a point.
+struct Push<R> {
+    /// What acts on its corners, N.
     pull: [Vector<R>; 4],
+    /// Energy, mJ, and sum of the forces along their own directions, N: what the energy gains for each mm of radius.
+    energy: R,
+    pressing: R,
+    /// Features that push.
+    count: R,
+}
+
+impl<R: Real> Push<R> {
+    #[inline(always)]
+    fn none() -> Self {
+        let zero = R::from_f64(0.0);
+        Self { pull: [[zero; 3]; 4], energy: zero, pressing: zero, count: zero }
+    }
+
+    /// Adds a `force` (N) on the point, `away` from a place by weights of the corners, and its `energy` (mJ).
+    #[inline(always)]
+    fn add(&mut self, weights: [R; 4], away: Vector<R>, force: R, energy: R) {
+        self.energy = self.energy + energy;
+        self.pressing = self.pressing + force;
+        for a in 0..4 {
+            self.pull[a] = fma(away, -(force * weights[a]), self.pull[a]);
+        }
+    }
+
+    /// Adds an edge or a corner within the radius, with its `sign` in the sum.
+    #[inline(always)]
+    fn add_border<const N: usize>(&mut self, at: &Point<R, N>, border: &OnEdge<R>, sign: f64) {
+        if border.square < at.radius * at.radius {
+            let distance = border.square.sqrt();
+            let depth = at.radius - distance;
+            let force = R::from_f64(sign) * (at.penalty * depth);
+            let away = scale(border.offset, R::from_f64(1.0) / distance.max(R::from_f64(1e-12)));
+            self.add(border.weights, away, force, R::from_f64(0.5) * force * depth);
+            self.count = self.count + R::from_f64(sign).max(R::from_f64(0.0));
+        }
+    }
+
+    /// The force on the point, N.
+    #[inline(always)]
+    fn total(&self) -> Vector<R> {
+        let [a, b, c, d] = self.pull;
+        scale(add(add(a, b), add(c, d)), R::from_f64(-1.0))
+    }
+
+    /// Of a face with edges and corners by its `marks`.
+    #[inline(always)]
+    fn of_face<const N: usize>(at: &Point<R, N>, q: &[Vector<R>; 4], marks: u32, point: &Closest<R>) -> Self {
+        let (mut push, depth) = (Self::none(), at.radius - point.distance);
+        if !(depth > R::from_f64(0.0)) {
+            return push;
+        }
+        let force = at.penalty * depth;
+        push.add(point.weights, point.away, force, R::from_f64(0.5) * force * depth);
+        push.count = R::from_f64(1.0);
+        for a in 0..4 {
+            if marks >> a & 1 == 1 {
+                push.add_border(at, &on_edge(q, a), -1.0);
+            }
+            if marks >> (4 + a) & 1 == 1 {
+                push.add_border(at, &on_corner(q, a), 1.0);
+            }
+        }
+        push
+    }
 }
 
 /// What a body does to a point.
 struct Pushed<R> {
-    /// Where its surface is nearest; what acts there is added to nodes last.
-    nearest: Pressed<R>,
-    /// Resultant of the elastic forces on the point, N, and their energy, mJ.
+    nearest: Nearest<R>,
+    /// Resultant of the elastic forces on the point, N, and their energy, mJ; see [`Push`].
     push: Vector<R>,
     energy: R,
-    /// Sum of the elastic forces along their own directions, N: what the energy gains for each mm of radius.
     pressing: R,
-    /// Features that push.
     features: R,
+    /// Sum of the forces of faces, N.
+    shared: R,
+    /// Of places on the faces that push, times their forces, or of the nearest place if none does: velocity, mm/s, reference place from
+    /// the point, mm, and inverse mass, 1/tonne.
+    motion: Vector<R>,
+    apart: Vector<R>,
+    inverse: R,
 }
 
 impl<R: Real> Pushed<R> {
     #[inline(always)]
     fn none() -> Self {
         let zero = R::from_f64(0.0);
-        let corners = Corners { nodes: [0; 4], reference: [[zero; 3]; 4], current: [[zero; 3]; 4] };
-        let (weights, away) = ([zero; 4], [zero; 3]);
-        let point = Closest { weights, away, distance: zero, height: zero, interior: false };
-        let nearest = Pressed { found: false, corners, point, pull: [[zero; 3]; 4] };
-        Self { nearest, push: [zero; 3], energy: zero, pressing: zero, features: zero }
+        let nearest = Nearest { found: false, entry: EMPTY, away: [zero; 3], distance: zero, height: zero };
+        let (push, motion, apart) = ([zero; 3], [zero; 3], [zero; 3]);
+        let (energy, pressing, features, shared, inverse) = (zero, zero, zero, zero, zero);
+        Self { nearest, push, energy, pressing, features, shared, motion, apart, inverse }
     }
 
     /// Whether a place is nearer than what is known. Of faces whose common edge or corner is nearest, the one that is seen most
     /// steeply tells on which side the point is.
     #[inline(always)]
     fn is_nearer(&self, point: &Closest<R>) -> bool {
-        let known = &self.nearest.point;
-        let tie = known.distance * R::from_f64(1e-4) + R::from_f64(1e-7);
+        let known = &self.nearest;
+        let tie = known.distance * R::from_f64(TIE) + R::from_f64(0.1 * GAP_ROUNDING);
         let apart = point.distance - known.distance;
-        !self.nearest.found || apart < -tie || apart <= tie && point.height.abs() > known.height.abs()
+        !known.found || apart < -tie || apart <= tie && point.height.abs() > known.height.abs()
     }
 
     /// Whether the point is behind the nearest place that is known, no deeper than what is pushed out.
     #[inline(always)]
     fn is_behind(&self, params: &Params) -> bool {
-        let Pressed { found, point, .. } = &self.nearest;
-        *found && point.height < R::from_f64(0.0) && point.distance < R::from_f64(f64::from(params.depth))
+        let Nearest { found, distance, height, .. } = self.nearest;
+        found && height < R::from_f64(0.0) && distance < R::from_f64(f64::from(params.depth))
     }
 
     /// Distance from which on a face cannot change what is nearest, mm.
     #[inline(always)]
     fn beyond(&self) -> R {
-        self.nearest.point.distance * R::from_f64(1.0 - 2e-4) - R::from_f64(2e-7)
+        self.nearest.distance * R::from_f64(1.0 - 2.0 * TIE) - R::from_f64(0.2 * GAP_ROUNDING)
     }
 
-    /// Adds an elastic `force` (N) of a feature and its `energy` (mJ) on the point; notes its opposite on the corners of its face.
+    /// Adds what pushes a point out that is inside; returns how deep it is, mm.
     #[inline(always)]
-    fn add(&mut self, pull: &mut [Vector<R>; 4], weights: [R; 4], away: Vector<R>, force: R, energy: R) {
-        self.push = fma(away, force, self.push);
+    fn push_out<const N: usize>(&mut self, at: &Point<R, N>) -> R {
+        let Nearest { away, distance, .. } = self.nearest;
+        let (force, energy) = out(at, distance);
+        self.push = fma(away, -force, self.push);
         self.energy = self.energy + energy;
         self.pressing = self.pressing + force;
-        for a in 0..4 {
-            pull[a] = fma(away, -(force * weights[a]), pull[a]);
-        }
+        self.features = self.features + R::from_f64(1.0);
+        distance
     }
 
-    /// Adds an edge or a corner within the radius, with its `sign` in the sum.
+    /// Adds what a face does.
     #[inline(always)]
-    fn add_border<const N: usize>(
-        &mut self,
-        pull: &mut [Vector<R>; 4],
-        at: &Point<R, N>,
-        border: &OnEdge<R>,
-        sign: f64,
-    ) {
-        if border.square < at.radius * at.radius {
-            let distance = border.square.sqrt();
-            let depth = at.radius - distance;
-            let force = R::from_f64(sign) * (at.penalty * depth);
-            let away = scale(border.offset, R::from_f64(1.0) / distance.max(R::from_f64(1e-12)));
-            self.add(pull, border.weights, away, force, R::from_f64(0.5) * force * depth);
-            self.features = self.features + R::from_f64(sign).max(R::from_f64(0.0));
-        }
+    fn add(&mut self, push: &Push<R>) {
+        self.push = add(self.push, push.total());
+        self.energy = self.energy + push.energy;
+        self.pressing = self.pressing + push.pressing;
+        self.features = self.features + push.count;
     }
+}
+
+/// What damping and friction do to a point, N, and a bound of all its stiffness against a body, N/mm.
+struct Rubbed<R> {
+    force: Vector<R>,
+    rows: R,
 }
 
 impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTION, PERIODIC> {
@@ -290,7 +345,8 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
     fn all_bodies<const N: usize>(&self, at: &Point<R, N>, list: &[u32], closed: R, closing: R, kept: &mut Kept<R>) {
         let zero = R::from_f64(0.0);
         // a point that was inside is no deeper than this now
-        let most = kept.gaps[INNER] + closing + R::from_f64(GAP_ROUNDING);
+        let deepest = kept.gaps[INNER] + closing;
+        let most = deepest + margin(at.radius + deepest);
         let skin = R::from_f64(f64::from(self.params.skin));
         let (mut least, mut inner) = (skin, zero);
         let (mut own, mut energy, mut touching) = ([0i32; 3], zero, false);
@@ -308,16 +364,24 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
                 least = least.min(nearest);
                 continue;
             }
-            let gaps = &mut kept.gaps[GAPS + first..GAPS + end];
-            let mut pushed = self.look(at, &list[first..end], gaps, most, &mut own, kept.sums);
-            least = gaps.iter().fold(least, |least, gap| least.min(*gap));
-            let depth = self.push_out(at, &mut pushed);
+            let (entries, gaps) = (&list[first..end], GAPS + first..GAPS + end);
+            let mut pushed = self.look(at, entries, &mut kept.gaps[gaps.clone()], most);
+            least = kept.gaps[gaps.clone()].iter().fold(least, |least, gap| least.min(*gap));
+            let inside = pushed.is_behind(&self.params);
+            let depth = if inside { pushed.push_out(at) } else { zero };
             inner = inner.max(depth);
-            touching |= self.settle(at, body, depth, &mut pushed, &mut own, kept);
+            if let Some(rubbed) = self.settle(at, body, depth, &mut pushed, kept) {
+                touching = true;
+                for (entry, i) in entries.iter().zip(gaps) {
+                    if kept.gaps[i] < zero || *entry == pushed.nearest.entry {
+                        self.press(at, *entry, inside, &pushed, &rubbed, &mut own, kept.sums);
+                    }
+                }
+            }
             energy = energy + pushed.energy;
         }
         (kept.gaps[LEAST], kept.gaps[CLOSED], kept.gaps[INNER]) =
-            (least - inner - R::from_f64(GAP_ROUNDING), zero, inner);
+            (least - inner - margin(at.radius + inner), zero, inner);
         kept.sums[SUM_ENERGY] = energy;
         if own != [0; 3] {
             self.share_out(at, own);
@@ -327,7 +391,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         }
     }
 
-    /// Damping, friction, and what is left of a body's touch; whether it still touches.
+    /// Damping, friction, and what is left of a body's touch; what they do if it still touches.
     #[inline(always)]
     fn settle<const N: usize>(
         &self,
@@ -335,41 +399,32 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         body: u32,
         depth: R,
         pushed: &mut Pushed<R>,
-        own: &mut [i32; 3],
         kept: &mut Kept<R>,
-    ) -> bool {
+    ) -> Option<Rubbed<R>> {
         let (zero, size) = (R::from_f64(0.0), const { touch(FRICTION) });
         let touches = pushed.features > zero;
         let keys = &mut kept.keys[MADE..];
-        let Some(slot) = place_of(keys, body, touches) else { return false };
+        let slot = place_of(keys, body, touches)?;
         let touch = &mut kept.touches[size * slot..][..size];
-        self.rub(at, pushed, touch, kept.sums);
-        self.pull(&pushed.nearest, own, kept.sums);
+        let rubbed = self.rub(at, pushed, touch, kept.sums);
         let work = pushed.pressing * at.full_radius * self.row.radius_increment;
         kept.sums[SUM_RADIUS] = kept.sums[SUM_RADIUS] + work;
-        keys[slot] = if touches { body } else { EMPTY };
-        if touches {
-            let outside = (at.radius - pushed.nearest.point.distance).max(zero);
-            let deep = if depth > zero { at.radius + depth } else { outside };
-            raise(&self.flags[status::PENETRATION[self.kind]], deep);
-        } else {
+        if !touches {
+            keys[slot] = EMPTY;
             touch.fill(zero);
+            return None;
         }
-        touches
+        keys[slot] = body;
+        let outside = (at.radius - pushed.nearest.distance).max(zero);
+        raise(&self.flags[status::PENETRATION[self.kind]], if depth > zero { at.radius + depth } else { outside });
+        Some(rubbed)
     }
 
-    /// Adds what a face does to a point, with the edges and corners that it owns; returns the gap, or as much as is sure to be left
-    /// of it, mm. A face whose gap is sure to exceed `most` need not be looked at closely.
+    /// Adds what a face does to a point; returns the gap, or as much as is sure to be left of it, mm. A face whose gap is sure to
+    /// exceed `most` need not be looked at closely.
     #[inline(always)]
-    fn face<const N: usize>(
-        &self,
-        at: &Point<R, N>,
-        (face, image): (usize, [i32; 2]),
-        most: R,
-        pushed: &mut Pushed<R>,
-        own: &mut [i32; 3],
-        sums: &mut [R],
-    ) -> R {
+    fn face<const N: usize>(&self, at: &Point<R, N>, entry: u32, most: R, pushed: &mut Pushed<R>) -> R {
+        let (face, image) = of_key(entry);
         let corners = self.surface.corners(face, image, at.nodes[0], at.from);
         let q = &corners.current;
         let patch = Patch::new(q);
@@ -378,31 +433,27 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
             return sure;
         }
         let point = closest(q, &patch);
-        let gap = point.distance - at.radius;
-        let pushes = gap < R::from_f64(0.0);
-        let mut pull = [[R::from_f64(0.0); 3]; 4];
-        if pushes {
-            let marks = self.surface.marks(face);
-            let force = at.penalty * -gap;
-            pushed.add(&mut pull, point.weights, point.away, force, R::from_f64(-0.5) * force * gap);
-            pushed.features = pushed.features + R::from_f64(1.0);
-            for a in 0..4 {
-                if marks >> a & 1 == 1 {
-                    pushed.add_border(&mut pull, at, &on_edge(q, a), -1.0);
-                }
-                if marks >> (4 + a) & 1 == 1 {
-                    pushed.add_border(&mut pull, at, &on_corner(q, a), 1.0);
-                }
-            }
+        pushed.add(&Push::of_face(at, q, self.surface.marks(face), &point));
+        let (zero, is_nearer) = (R::from_f64(0.0), pushed.is_nearer(&point));
+        if is_nearer {
+            let Closest { away, distance, height, .. } = point;
+            pushed.nearest = Nearest { found: true, entry, away, distance, height };
         }
-        let face = Pressed { found: true, corners, point, pull };
-        if pushed.is_nearer(&point) {
-            let before = std::mem::replace(&mut pushed.nearest, face);
-            if before.found && before.point.distance < at.radius {
-                self.pull(&before, own, sums);
+        let gap = point.distance - at.radius;
+        let force = at.penalty * (-gap).max(zero);
+        let alone = !(pushed.shared > zero);
+        if force > zero || alone && is_nearer {
+            let share = if force > zero { force } else { R::from_f64(1.0) };
+            if alone {
+                (pushed.motion, pushed.apart, pushed.inverse) = ([zero; 3], [zero; 3], zero);
             }
-        } else if pushes {
-            self.pull(&face, own, sums);
+            for (a, weight) in point.weights.into_iter().enumerate() {
+                let node = corners.nodes[a];
+                pushed.motion = fma(self.velocity.at(node), share * weight, pushed.motion);
+                pushed.apart = fma(corners.reference[a], share * weight, pushed.apart);
+                pushed.inverse = pushed.inverse + share * (weight * weight / self.mass[node]);
+            }
+            pushed.shared = pushed.shared + force;
         }
         gap
     }
@@ -416,56 +467,61 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
 
     /// What a body does to a point, by its entries and their gaps: those that are no larger than `most` are looked at.
     #[inline(always)]
-    fn look<const N: usize>(
-        &self,
-        at: &Point<R, N>,
-        entries: &[u32],
-        gaps: &mut [R],
-        most: R,
-        own: &mut [i32; 3],
-        sums: &mut [R],
-    ) -> Pushed<R> {
+    fn look<const N: usize>(&self, at: &Point<R, N>, entries: &[u32], gaps: &mut [R], most: R) -> Pushed<R> {
         let mut pushed = Pushed::none();
-        for (gap, entry) in gaps.iter_mut().zip(entries) {
-            if *gap <= most {
-                *gap = self.face(at, of_key(*entry), most, &mut pushed, own, sums);
+        for again in [false, true] {
+            // a point that seems to be inside is so only if no other face is nearer
+            if again && !pushed.is_behind(&self.params) {
+                break;
             }
-        }
-        if pushed.is_behind(&self.params) {
-            // it is inside only if no other face is nearer
             for (gap, entry) in gaps.iter_mut().zip(entries) {
-                let beyond = pushed.beyond() - at.radius;
-                if *gap < beyond {
-                    *gap = self.face(at, of_key(*entry), beyond, &mut pushed, own, sums);
+                let limit = if again { pushed.beyond() - at.radius } else { most };
+                if (*gap > most) == again && *gap <= limit {
+                    *gap = self.face(at, *entry, limit, &mut pushed);
                 }
             }
         }
         pushed
     }
 
-    /// Pushes a point out of a body that it is inside of; returns how deep it is, mm.
+    /// Adds what a face does to a point, which may be `inside` behind the nearest one, to the nodes, with its share of what damping
+    /// and friction do.
     #[inline(always)]
-    fn push_out<const N: usize>(&self, at: &Point<R, N>, pushed: &mut Pushed<R>) -> R {
-        let (zero, half) = (R::from_f64(0.0), R::from_f64(0.5));
-        if !pushed.is_behind(&self.params) {
-            return zero;
+    fn press<const N: usize>(
+        &self,
+        at: &Point<R, N>,
+        entry: u32,
+        inside: bool,
+        pushed: &Pushed<R>,
+        rubbed: &Rubbed<R>,
+        own: &mut [i32; 3],
+        sums: &mut [R],
+    ) {
+        let (face, image) = of_key(entry);
+        let corners = self.surface.corners(face, image, at.nodes[0], at.from);
+        let q = &corners.current;
+        let point = closest(q, &Patch::new(q));
+        let mut push = Push::of_face(at, q, self.surface.marks(face), &point);
+        let (zero, is_nearest) = (R::from_f64(0.0), entry == pushed.nearest.entry);
+        if inside && is_nearest {
+            let (force, energy) = out(at, point.distance);
+            push.add(point.weights, scale(point.away, R::from_f64(-1.0)), force, energy);
         }
-        let Pressed { point, mut pull, .. } = pushed.nearest;
-        let depth = point.distance;
-        let (whole, outside) = (at.radius + depth, (at.radius - depth).max(zero));
-        let out = scale(point.away, R::from_f64(-1.0));
-        let energy = half * at.penalty * (whole * whole - outside * outside);
-        pushed.add(&mut pull, point.weights, out, at.penalty * (whole + outside), energy);
-        pushed.features = pushed.features + R::from_f64(1.0);
-        pushed.nearest.pull = pull;
-        depth
+        let alone = if is_nearest { R::from_f64(1.0) } else { zero };
+        let force = at.penalty * (at.radius - point.distance).max(zero);
+        let share = if pushed.shared > zero { force / pushed.shared } else { alone };
+        for (pull, weight) in push.pull.iter_mut().zip(point.weights) {
+            *pull = fma(rubbed.force, -(share * weight), *pull);
+        }
+        self.pull(&corners, &push.pull, own, sums);
+        let quantum = R::from_f64(f64::from(self.params.stiffness_quantum));
+        add_stiffness(self.stiffness, rubbed.rows * share, quantum, corners.nodes.into_iter().zip(point.weights));
     }
 
     /// Adds forces to the corners of a face, and their opposite to what acts on the point, as integers whose sum is zero: the last
     /// corner takes what the rounding of the others leaves.
     #[inline(always)]
-    fn pull(&self, face: &Pressed<R>, own: &mut [i32; 3], sums: &mut [R]) {
-        let Pressed { corners, pull, .. } = face;
+    fn pull(&self, corners: &Corners<R>, pull: &[Vector<R>; 4], own: &mut [i32; 3], sums: &mut [R]) {
         let quantum = R::from_f64(f64::from(self.params.force_quantum));
         let sum = add(add(pull[0], pull[1]), add(pull[2], pull[3])).map(|f| f / quantum);
         if !sum.iter().all(|q| is_in_range(self.flags, *q, corners.nodes[0])) {
@@ -487,34 +543,38 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         }
     }
 
-    /// What damping and friction take, once for a point and a body, where the surface is nearest: a touch with its state goes on.
+    /// What damping and friction do, once for a point and a body: against the mean motion of the faces that push, by their forces. A
+    /// touch with its state goes on.
     #[inline(always)]
-    fn rub<const N: usize>(&self, at: &Point<R, N>, pushed: &mut Pushed<R>, touch: &mut [R], sums: &mut [R]) {
+    fn rub<const N: usize>(
+        &self,
+        at: &Point<R, N>,
+        pushed: &mut Pushed<R>,
+        touch: &mut [R],
+        sums: &mut [R],
+    ) -> Rubbed<R> {
         let (zero, half, two) = (R::from_f64(0.0), R::from_f64(0.5), R::from_f64(2.0));
-        let Pressed { corners, point, .. } = pushed.nearest;
-        let (mut motion, mut apart, mut inverse) = ([zero; 3], [zero; 3], zero);
+        let shared = if pushed.shared > zero { pushed.shared } else { R::from_f64(1.0) };
+        let mut motion = scale(pushed.motion, R::from_f64(-1.0) / shared);
+        let mut inverse = pushed.inverse / shared;
         for (node, weight) in at.nodes.into_iter().zip(at.weights) {
             motion = fma(self.velocity.at(node), weight, motion);
             inverse = inverse + weight * weight / self.mass[node];
         }
-        for (a, weight) in point.weights.into_iter().enumerate() {
-            motion = fma(self.velocity.at(corners.nodes[a]), -weight, motion);
-            apart = fma(corners.reference[a], -weight, apart);
-            inverse = inverse + weight * weight / self.mass[corners.nodes[a]];
-        }
         if PERIODIC {
+            let apart = scale(pushed.apart, R::from_f64(-1.0) / shared);
             motion = add(motion, apply(&self.row.rate, apart));
         }
         let size = norm(pushed.push);
-        let normal = if size > zero { scale(pushed.push, R::from_f64(1.0) / size) } else { point.away };
+        let normal = if size > zero { scale(pushed.push, R::from_f64(1.0) / size) } else { pushed.nearest.away };
         let approach = dot(motion, normal);
         let viscosity = viscosity(&self.params, at.penalty, inverse);
         let pressing = (size - viscosity * approach).max(zero);
         // over the way since the positions before, with the mean of the forces before and now
-        let damped = size - pressing;
-        sums[SUM_DAMPING] = sums[SUM_DAMPING] + half * (touch[DAMPED] + damped) * approach * self.elapsed;
-        (touch[NORMAL], touch[DAMPED]) = (pressing, damped);
-        let mut force = scale(normal, -damped);
+        let drag = size - pressing;
+        sums[SUM_DAMPING] = sums[SUM_DAMPING] + half * (touch[DAMPED] + drag) * approach * self.elapsed;
+        (touch[NORMAL], touch[DAMPED]) = (pressing, drag);
+        let mut force = scale(normal, -drag);
         if FRICTION {
             let tangential = at.penalty * R::from_f64(f64::from(self.params.tangential));
             let limit = R::from_f64(f64::from(self.params.friction)) * pressing;
@@ -526,13 +586,10 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
             pushed.energy = pushed.energy + half * tangential * dot(slid.elastic, slid.elastic);
             force = fma(slid.elastic, -tangential, force);
         }
-        for (pull, weight) in pushed.nearest.pull.iter_mut().zip(point.weights) {
-            *pull = fma(force, -weight, *pull);
-        }
         let rows = (R::from_f64(1.0) + at.size) * (at.penalty * pushed.features + viscosity * (two / self.row.dt));
         let quantum = R::from_f64(f64::from(self.params.stiffness_quantum));
-        add_stiffness(self.stiffness, rows, quantum, corners.nodes.into_iter().zip(point.weights));
         add_stiffness(self.stiffness, rows, quantum, at.nodes.into_iter().zip(at.weights));
+        Rubbed { force, rows }
     }
 
     /// Adds what acts on a point to its nodes.

@@ -1,6 +1,6 @@
 //! How far contact points have slipped since the start, for pictures: taken from the sums of contact before these are set back.
 
-use super::penalty::{SUM_SLIP, sums};
+use super::sums::{SUM_SLIP, sums};
 use crate::kernel::lane::Lane;
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel};

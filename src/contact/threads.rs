@@ -14,8 +14,8 @@
 use super::bow::{Bows, Piece};
 use super::friction::slide;
 use super::grid::{BOX, MOTION, absolute, cell_index, cells, has_moved, inverse, pull_back};
-use super::penalty::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
 use super::segments::{Push, Segments};
+use super::sums::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
 use super::{EMPTY, Params, add_force, add_stiffness, found, is_in_range, key, of_key, shift, slot_state, status};
 use crate::elements::beam2::TABLE;
 use crate::kernel::lane::{Lane, Real};
@@ -124,13 +124,9 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
     fn cells(&self, io: &Io<R>, beam: usize, piece: &Piece<R>) -> Option<Cells> {
         let (node, _) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &self.inverse, self.scene.ends[2 * beam] as usize);
         let ends = piece.now.map(|end| pull_back(&self.inverse, end));
-        // lines leave the boxes of their items by so much
-        let beside = R::from_f64(f64::from(self.params.beside));
         let range = |k: usize| {
-            let room =
-                beside * (self.inverse[k][0] * self.inverse[k][0] + self.inverse[k][1] * self.inverse[k][1]).sqrt();
             let (a, b) = (node[k] + ends[0][k], node[k] + ends[1][k]);
-            cells::<_, PERIODIC>(&self.params, k, a.min(b) - room, a.max(b) + room)
+            cells::<_, PERIODIC>(&self.params, k, a.min(b), a.max(b))
         };
         (node[0].is_finite() && node[1].is_finite()).then(|| [range(0), range(1)])
     }

@@ -9,7 +9,7 @@ use super::{Builder, Capacity, ContactPoint, after, beside, coded, own, thicknes
 use crate::case::effects::Contact;
 use crate::contact::found::NEVER;
 use crate::contact::travel::SKIN_APART;
-use crate::contact::{EMPTY, Params, candidates, grid, penalty, slot_state, threads, tie};
+use crate::contact::{EMPTY, Params, candidates, grid, penalty, slot_state, sums, surface, threads, tie};
 use crate::elements::beam2;
 use crate::error::Result;
 use crate::kernel::buffer::{Buffer, Initial, Kind};
@@ -23,7 +23,7 @@ pub struct FaceBuffers {
     pub sums: Buffer,
     /// See [`candidates::CARRIER`].
     pub carriers: Buffer,
-    /// List of near faces of each carrier, see [`crate::contact::face::entry`], and gap counters of each point.
+    /// List of near faces of each carrier, see [`crate::contact::surface::entry`], and gap counters of each point.
     pub near: Buffer,
     pub gaps: Buffer,
     /// Bodies that each point touches, and [`penalty::touch`] of each.
@@ -232,15 +232,15 @@ impl ContactScene<'_> {
         let carriers = b.indices(names.carriers, carried.carriers.clone());
         let nodes = b.indices(names.nodes, carried.nodes.clone());
         let points = b.table(names.points, carried.points.clone());
-        let (list, row) = (penalty::MADE + faces, penalty::GAPS + faces);
-        let (places, size) = (penalty::MADE + slots, penalty::touch(friction));
+        let (list, row) = (candidates::MADE + faces, penalty::GAPS + faces);
+        let (places, size) = (candidates::MADE + slots, penalty::touch(friction));
         let empty = |len: usize| Initial::Uint(vec![EMPTY; len]);
         let near = b.add(names.near, Kind::Uint, list * lists, true, empty(list * lists));
         let gaps = b.add(names.gaps, Kind::Scalar, row * count, true, Initial::Zero);
         let keys = b.add(names.keys, Kind::Uint, places * count, true, empty(places * count));
         let touches = b.add(names.touches, Kind::Scalar, size * slots * count, true, Initial::Zero);
         let found = b.add(names.found, Kind::Uint, lists, true, Initial::Uint(vec![NEVER; lists]));
-        let sums = b.scratch(names.sums, penalty::sums(friction, periodic) * count);
+        let sums = b.scratch(names.sums, sums::sums(friction, periodic) * count);
 
         let mut reads = [
             &[carriers, nodes, points, tables.slabs, tables.faces][..],
@@ -259,7 +259,7 @@ impl ContactScene<'_> {
             (gaps, own(1, row)),
             (keys, own(1, places)),
             (touches, own(1, size * slots)),
-            (sums, own(1, penalty::sums(friction, periodic))),
+            (sums, own(1, sums::sums(friction, periodic))),
             (force, Access::Atomic),
             (stiffness, Access::Atomic),
             self.status(),
@@ -282,7 +282,7 @@ impl ContactScene<'_> {
         let Active { friction, periodic, .. } = self.active;
         let keys = b.add("beam pairs", Kind::Uint, slots * beams, true, Initial::Uint(vec![EMPTY; slots * beams]));
         let state = b.add("beam pair state", Kind::Scalar, size * slots * beams, true, Initial::Zero);
-        let sums = b.scratch("beam pair sums", penalty::sums(friction, periodic) * beams);
+        let sums = b.scratch("beam pair sums", sums::sums(friction, periodic) * beams);
         let common = [&[self.ends, self.beams][..], &self.place(), &bows].concat();
         let reads = [&common[..], &[search.counts, search.lists, search.boxes]].concat();
         let found = b.add("when pairs were found", Kind::Uint, beams, true, Initial::Uint(vec![NEVER; beams]));
@@ -296,7 +296,7 @@ impl ContactScene<'_> {
         let writes = [
             keys_own,
             state_own,
-            (sums, own(1, penalty::sums(friction, periodic))),
+            (sums, own(1, sums::sums(friction, periodic))),
             (force, Access::Atomic),
             (stiffness, Access::Atomic),
             self.status(),
@@ -335,11 +335,11 @@ impl ContactScene<'_> {
             None => ([low[0] - CELL, low[1] - CELL], [high[0] - low[0] + 2.0 * CELL, high[1] - low[1] + 2.0 * CELL]),
         };
         let cells = size.map(|s| (libm::floor(s / CELL) as u32).clamp(1, 1024));
-        let points = surfaces.carried.iter().flat_map(|carried| carried.points.chunks_exact(penalty::POINT));
+        let points = surfaces.carried.iter().flat_map(|carried| carried.points.chunks_exact(surface::POINT));
         let stiffest = points.map(|point| point[4]).fold(0.0, f64::max);
         let longest = self.threads.beams.chunks_exact(beam2::TABLE).map(|beam| beam[3]).fold(0.0, f64::max);
-        let stiffest = stiffest.max(self.chosen.tie_n_mm);
-        let along = self.chosen.thread_thread_penalty_n_mm2 * longest;
+        let stiffest = if self.active.ties { stiffest.max(self.chosen.tie_n_mm) } else { stiffest };
+        let along = if self.active.thread_thread { self.chosen.thread_thread_penalty_n_mm2 * longest } else { 0.0 };
         let radius = self.threads.radius.iter().copied().fold(0.0, f64::max);
         let thickness = mesh.blocks.iter().map(|b| thickness(mesh, b)).fold(f64::INFINITY, f64::min);
         let depth = 0.5 * thickness.min(0.4);
@@ -364,7 +364,6 @@ impl ContactScene<'_> {
             thread_radius: radius as f32,
             thread_thread: self.chosen.thread_thread_penalty_n_mm2 as f32,
             self_arc: mesh.self_arc() as f32,
-            beside: self.threads.beside() as f32,
             depth: depth.min(f64::from(f32::MAX)) as f32,
             state: slot_state(self.active.friction) as u32,
             // along each axis, so that it is as much in space

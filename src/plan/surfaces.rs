@@ -5,16 +5,16 @@ use super::effects::Active;
 use super::threads::Threads;
 use crate::case::effects::Contact;
 use crate::contact::candidates::CARRIER;
-use crate::contact::face::{FACE, MOST_FACES, MOST_NODES, coded, marks};
 use crate::contact::grid::SLAB_FACES;
+use crate::contact::surface::{FACE, MOST_FACES, MOST_NODES, coded, marks};
 use crate::contact::{EMPTY, arc};
 use crate::elements::beam2::TABLE;
 use crate::error::{Error, Result};
 use crate::mesh::surface::{Surface, owned};
 use crate::mesh::{Mesh, Seen};
 
-/// What carries contact points: see [`crate::contact::candidates::CARRIER`], [`crate::contact::penalty::CARRIED`] and
-/// [`crate::contact::penalty::POINT`].
+/// What carries contact points: see [`crate::contact::candidates::CARRIER`], [`crate::contact::surface::CARRIED`] and
+/// [`crate::contact::surface::POINT`].
 #[derive(Default)]
 pub struct Carried {
     pub carriers: Vec<u32>,

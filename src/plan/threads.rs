@@ -139,17 +139,4 @@ impl Threads {
     pub fn beams(&self) -> usize {
         self.thermal.len()
     }
-
-    /// Largest distance from the ends of a piece of a line to where they were if it were moved as a whole, mm: half the sum of the
-    /// largest shifts of its ends.
-    pub fn beside(&self) -> f64 {
-        let length = |beam: usize| self.beams[TABLE * beam + 3];
-        let shifts = (0..self.beams()).map(|beam| {
-            let [n, s] = [bow::NEIGHBOURS * beam, bow::SHARES * beam];
-            let (before, behind) = (self.neighbours[n] as usize, self.neighbours[n + 1] as usize);
-            let s = &self.shares[s..][..bow::ARC];
-            s[0] * length(before) + (s[1] + s[2]) * length(beam) + s[3] * length(behind)
-        });
-        0.5 * shifts.fold(0.0, f64::max)
-    }
 }

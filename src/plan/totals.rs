@@ -1,7 +1,7 @@
 //! The stages that add up what kernels keep per item, and where the host finds the sums.
 
 use super::{Active, Builder, beside, coded};
-use crate::contact::{penalty, slip};
+use crate::contact::{slip, sums};
 use crate::dynamics::energy;
 use crate::dynamics::integrate::Works;
 use crate::dynamics::totals::{self, Params, Sum, WORST, Worst};
@@ -264,10 +264,10 @@ pub(super) fn add(b: &mut Builder, s: &Sources) -> (Totals, [Option<Buffer>; 2])
     let mut contact = Vec::new();
     for (sums, points) in s.face_sums.into_iter().zip(s.points) {
         let Some(sums) = sums else { continue };
-        contact.push(c.taken(sums, Columns::rows(points, penalty::sums(friction, periodic)), true));
+        contact.push(c.taken(sums, Columns::rows(points, sums::sums(friction, periodic)), true));
     }
     if let Some(sums) = s.pair_sums {
-        contact.push(c.taken(sums, Columns::rows(beams, penalty::sums(friction, periodic)), false));
+        contact.push(c.taken(sums, Columns::rows(beams, sums::sums(friction, periodic)), false));
     }
     let mut stress = Vec::new();
     if let Some(virial) = s.hex_virial {

@@ -5,7 +5,7 @@ use crate::case::domain::{Domain, ThreadEnds};
 use crate::case::effects::Contact;
 use crate::case::read::Loaded;
 use crate::contact::EMPTY;
-use crate::contact::penalty::MADE;
+use crate::contact::candidates::MADE;
 use crate::simulate::Simulation;
 
 /// An effect that a scene has.

@@ -1,8 +1,8 @@
 //! Guards: each names the cause, where it was, its size, and what to change.
 
 use super::Simulation;
-use crate::contact::candidates::CARRIER;
-use crate::contact::{EMPTY, of_key, penalty, status};
+use crate::contact::candidates::{self, CARRIER};
+use crate::contact::{EMPTY, of_key, status};
 use crate::error::{Error, Guard, Result};
 use crate::kernel::buffer::Buffer;
 use crate::kernel::position::MOST_MM;
@@ -73,7 +73,7 @@ impl Simulation {
         let faces = b.faces[kind]?;
         let (keys, touches) = (self.backend.uints(faces.keys), self.backend.scalars(faces.touches));
         let (slots, points) = (self.capacity.slots, &self.model.points[kind]);
-        let keys = keys.chunks_exact(penalty::MADE + slots).flat_map(|row| &row[penalty::MADE..]);
+        let keys = keys.chunks_exact(candidates::MADE + slots).flat_map(|row| &row[candidates::MADE..]);
         let keys: Vec<u32> = keys.copied().collect();
         let pressure = |slot: usize| touches[slot * self.model.touch] / points[slot / slots].measure;
         let touching = (0..keys.len()).filter(|slot| keys[*slot] != EMPTY);
@@ -95,7 +95,7 @@ impl Simulation {
         };
         let of_faces = [0, 1].map(|kind| {
             let faces = b.faces[kind]?;
-            let (item, count) = most(faces.near, penalty::MADE, self.capacity.faces);
+            let (item, count) = most(faces.near, candidates::MADE, self.capacity.faces);
             let of_list = |carrier: &[u32]| carrier[0] as usize;
             let first = self.backend.uints(faces.carriers).chunks_exact(CARRIER).nth(item).map(of_list)?;
             let node = self.model.points[kind][first].nodes[0];

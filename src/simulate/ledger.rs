@@ -1,7 +1,7 @@
 //! The energy ledger: what is stored now, and what has been put in and lost since the start.
 
 use super::{Simulation, StressMean};
-use crate::contact::penalty;
+use crate::contact::sums;
 use crate::error::Result;
 use crate::kernel::stage::Stage;
 use crate::plan::Sums;
@@ -105,7 +105,7 @@ impl Simulation {
         for buffer in [force, stiffness, b.status] {
             self.backend.clear(buffer);
         }
-        Ok(self.model.totals.contact.iter().map(|sums| sums.of(&totals, penalty::SUM_ENERGY)).sum())
+        Ok(self.model.totals.contact.iter().map(|sums| sums.of(&totals, sums::SUM_ENERGY)).sum())
     }
 
     /// Energy of threads that are not at rest as they are generated or start aside of that: their stages once, before the first
@@ -145,12 +145,12 @@ impl Simulation {
     pub(super) fn add_contact(&mut self, totals: &[f64]) {
         self.energies.contact = self.model.totals.ties.map_or(0.0, |ties| ties.of(totals, 0));
         for sums in &self.model.totals.contact {
-            self.energies.contact += sums.of(totals, penalty::SUM_ENERGY);
+            self.energies.contact += sums.of(totals, sums::SUM_ENERGY);
             if self.model.active.friction {
-                self.energies.friction += sums.of(totals, penalty::SUM_FRICTION);
+                self.energies.friction += sums.of(totals, sums::SUM_FRICTION);
             }
-            self.energies.contact_damping += sums.of(totals, penalty::SUM_DAMPING);
-            self.energies.radius += sums.of(totals, penalty::SUM_RADIUS);
+            self.energies.contact_damping += sums.of(totals, sums::SUM_DAMPING);
+            self.energies.radius += sums.of(totals, sums::SUM_RADIUS);
         }
     }
 
@@ -159,7 +159,7 @@ impl Simulation {
         if self.mesh.period.is_none() {
             return;
         }
-        let (places, virial) = (&self.model.totals, penalty::virial(self.model.active.friction));
+        let (places, virial) = (&self.model.totals, sums::virial(self.model.active.friction));
         let old = self.schedule.row(from.max(0.0), 1.0, 1.0).gradient;
         let new = self.schedule.row(to, 1.0, 1.0).gradient;
         for i in 0..3 {

@@ -1,8 +1,8 @@
 //! The whole state of a scene as bytes, and a scene that goes on from it to the same bits.
 
 use super::{Energies, Health, Simulation, StressMean, WINDOW};
-use crate::contact::face::FACE;
-use crate::contact::penalty::MADE;
+use crate::contact::candidates::MADE;
+use crate::contact::surface::FACE;
 use crate::contact::threads::MOST_PAIRS;
 use crate::contact::{EMPTY, of_key, status};
 use crate::error::{Error, Result};

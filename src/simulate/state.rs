@@ -2,7 +2,7 @@
 
 use super::Simulation;
 use crate::case::steps::Precision;
-use crate::contact::{EMPTY, penalty};
+use crate::contact::{EMPTY, candidates, penalty};
 use crate::elements::LANES;
 use crate::kernel::buffer::Buffer;
 use crate::kernel::position::{QUANTUM, quanta};
@@ -153,7 +153,7 @@ impl Simulation {
             let slipped = b.slip[kind].map(|b| self.backend.scalars(b));
             let slots = self.capacity.slots;
             for (item, point) in self.model.points[kind].iter().enumerate() {
-                let keys = &keys[item * (penalty::MADE + slots)..][penalty::MADE..][..slots];
+                let keys = &keys[item * (candidates::MADE + slots)..][candidates::MADE..][..slots];
                 let slots = (0..slots).filter(|slot| keys[*slot] != EMPTY).map(|slot| item * slots + slot);
                 let normal: f64 = slots.map(|slot| touches[slot * self.model.touch + penalty::NORMAL]).sum();
                 for (node, share) in point.nodes.into_iter().zip(point.shares) {

@@ -1,0 +1,33 @@
+//! What contact sums up for each point and each beam: energies, slip, and the share of the homogenised stress.
+
+use crate::kernel::lane::Real;
+use crate::kernel::vector::Vector;
+
+/// Sums of a point or a beam: elastic energy now, mJ; over steps, energy lost to contact damping, and work of the growing
+/// radius, mJ.
+pub const SUM_ENERGY: usize = 0;
+pub const SUM_DAMPING: usize = 1;
+pub const SUM_RADIUS: usize = 2;
+/// With friction: energy lost to it, mJ, and slip, mm.
+pub const SUM_FRICTION: usize = 3;
+pub const SUM_SLIP: usize = 4;
+
+/// Where force ⊗ ΔX, N·mm (9), starts in the sums of a periodic scene.
+pub const fn virial(friction: bool) -> usize {
+    if friction { SUM_SLIP + 1 } else { SUM_RADIUS + 1 }
+}
+/// Number of the sums.
+pub const fn sums(friction: bool, periodic: bool) -> usize {
+    virial(friction) + if periodic { 9 } else { 0 }
+}
+
+/// Subtracts force ⊗ ΔX from the nine sums that make the homogenised stress.
+#[inline(always)]
+pub fn add_virial<R: Real>(sum: &mut [R], force: Vector<R>, apart: Vector<R>) {
+    for i in 0..3 {
+        for j in 0..3 {
+            let v = &mut sum[3 * i + j];
+            *v = *v - force[i] * apart[j];
+        }
+    }
+}
