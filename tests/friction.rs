@@ -188,6 +188,9 @@ fn a_thread_around_a_drum_follows_the_capstan_law() {
             let ratio = capstan(FRICTION, wrap, columns, beam);
             near(&format!("tension ratio over {name}, {columns} faces, beams of {beam} mm"), ratio, expected, allowed);
         }
-        near(&format!("tension ratio over {name} without friction"), capstan(0.0, wrap, 60, 0.2), 1.0, 1e-3);
+        // beams that come onto the drum and off it are felt, the less the shorter they are
+        for (beam, allowed) in [(0.2, 2e-3), (0.15, 1e-3)] {
+            near(&format!("tension ratio over {name} without friction"), capstan(0.0, wrap, 60, beam), 1.0, allowed);
+        }
     }
 }

@@ -47,8 +47,9 @@ fn made(case: Value, fabric: Value) -> Result<Mesh> {
     build(&case, Some(&fabric))
 }
 
-fn default_mesh() -> Mesh {
-    made(case(), fabric(0.03, 0.01)).unwrap()
+/// The cell of the paper.
+fn paper_mesh() -> Mesh {
+    made(with(case(), &[("/resolution", json!({ "beams_per_lap": 60 }))]), fabric(0.03, 0.01)).unwrap()
 }
 
 /// Finely divided sections and few slices: yarn outlines like the smooth ones.
@@ -71,8 +72,8 @@ fn refusal(case: Value, fabric: Value) -> String {
 }
 
 #[test]
-fn the_default_cell_has_the_counts_of_the_paper() {
-    let mesh = default_mesh();
+fn the_cell_of_the_paper_has_its_counts() {
+    let mesh = paper_mesh();
     assert_eq!(mesh.hexes(), 4488);
     assert_eq!(mesh.beams(), 480);
     assert_eq!(mesh.period, Some([10.0, 10.0]));
@@ -137,7 +138,7 @@ fn a_thread_is_as_long_as_its_path() {
 
 #[test]
 fn beams_are_tagged_as_loop_or_underlap() {
-    let mesh = default_mesh();
+    let mesh = paper_mesh();
     let thread = &mesh.threads[0];
     let loops = quality::length(&mesh, thread, Some(Part::Loop));
     let underlaps = quality::length(&mesh, thread, Some(Part::Underlap));
@@ -155,7 +156,7 @@ fn beams_of_laps(mesh: &Mesh, thread: usize) -> Vec<usize> {
 #[test]
 fn laps_differ_in_their_beams_unless_they_are_told_not_to() {
     let of = |variation: f64, finer: f64| {
-        let resolution = json!({ "lap_variation": variation, "finer": finer });
+        let resolution = json!({ "beams_per_lap": 60, "lap_variation": variation, "finer": finer });
         let mesh = made(with(case(), &[("/resolution", resolution)]), fabric(0.03, 0.01)).unwrap();
         let laps = [0, 1].map(|thread| beams_of_laps(&mesh, thread));
         println!("± {variation}, {finer} times as fine: {laps:?}");
@@ -168,7 +169,7 @@ fn laps_differ_in_their_beams_unless_they_are_told_not_to() {
     }
     let all: std::collections::BTreeSet<usize> = laps.iter().flatten().copied().collect();
     assert!(all.len() > 4 && all.contains(&57) && all.contains(&63), "{all:?}");
-    assert!(nodes == of(0.05, 1.0).1 && nodes == default_mesh().nodes);
+    assert!(nodes == of(0.05, 1.0).1 && nodes == paper_mesh().nodes);
     assert_eq!(of(0.0, 1.0).0, [[60; 4], [60; 4]]);
     let (fine, _) = of(0.05, 2.0);
     assert!(fine.iter().all(|thread| thread.iter().sum::<usize>() == 480));
@@ -191,7 +192,7 @@ fn every_loop_holds_both_legs_of_the_next() {
 
 #[test]
 fn loops_that_were_pulled_out_are_not_held() {
-    let mut mesh = default_mesh();
+    let mut mesh = paper_mesh();
     let first = mesh.threads[1].first;
     for node in &mut mesh.nodes[first..] {
         node[0] += 2.5;
@@ -207,7 +208,7 @@ fn areal_masses_hold_on_the_mesh() {
         assert!((mass.warp - 300.0).abs() < 1e-9 && (mass.weft - 300.0).abs() < 1e-9, "{mass:?}");
         assert!((mass.stitch - 43.4e-6 * 105.06 * 1e4).abs() < 0.5, "{mass:?}");
     }
-    let mesh = default_mesh();
+    let mesh = paper_mesh();
     assert!((mesh.blocks[0].density / 1.054e-9 - 1.0).abs() < 0.01, "{}", mesh.blocks[0].density);
     assert!((mesh.threads[0].axial - 350.0 * std::f64::consts::PI * 0.01).abs() < 1e-12);
     assert_eq!(mesh.threads[0].linear_density, 43.4e-12);
@@ -215,7 +216,7 @@ fn areal_masses_hold_on_the_mesh() {
 
 #[test]
 fn hexahedra_are_well_shaped_and_fibres_run_along_slices() {
-    let mesh = default_mesh();
+    let mesh = paper_mesh();
     for (ply, documented) in [(Ply::Warp, 0.986), (Ply::Weft, 0.962)] {
         for block in mesh.blocks.iter().filter(|b| b.ply == ply) {
             let worst = quality::scaled_jacobian(&mesh, block);
@@ -244,7 +245,7 @@ fn coordinates_are_whole_quanta_and_yarns_are_translates() {
 
 #[test]
 fn surfaces_are_closed_point_outwards_and_share_their_area() {
-    let mesh = default_mesh();
+    let mesh = paper_mesh();
     for block in [&mesh.blocks[0], &mesh.blocks[2]] {
         let surface = Surface::new(block);
         let middle = mesh.position(block.node(0, block.columns / 2, 1));
@@ -307,7 +308,7 @@ fn other_fabrics_are_built_clear_and_interlocked() {
 
 #[test]
 fn a_larger_cell_repeats_the_small_one() {
-    let alike = || with(case(), &[("/resolution", json!({ "lap_variation": 0 }))]);
+    let alike = || with(case(), &[("/resolution", json!({ "beams_per_lap": 60, "lap_variation": 0 }))]);
     let large = with(alike(), &[("/domain/cell", json!({ "warps": 3, "wefts": 6 }))]);
     let [small, large] = [alike(), large].map(|c| made(c, fabric(0.03, 0.01)).unwrap());
     assert_eq!(large.beams(), 3 * 6 * 60);
@@ -324,7 +325,7 @@ fn shipped_fabrics_build_and_report() {
     let mesh = made(case_value.clone(), shipped).unwrap();
     let text = report(&mesh, &serde_json::from_value(case_value).unwrap()).to_string();
     println!("{text}");
-    for part in ["4488 hexahedra, 480 beams", "300.00", "8 of 8 loops", "scaled Jacobian", "clearance"] {
+    for part in ["4488 hexahedra, 720 beams", "300.00", "8 of 8 loops", "scaled Jacobian", "clearance"] {
         assert!(text.contains(part), "{part} is missing from\n{text}");
     }
 }
@@ -456,7 +457,7 @@ fn coordinates_beyond_reach_are_refused() {
 
 #[test]
 fn the_abaqus_file_holds_every_element_in_its_true_shape() {
-    let mesh = default_mesh();
+    let mesh = paper_mesh();
     let mut text = Vec::new();
     export::inp(&mesh, &mut text).unwrap();
     let text = String::from_utf8(text).unwrap();

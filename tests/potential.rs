@@ -18,7 +18,7 @@ use tricot::simulate::{Make, Simulation};
 const RADIUS: f64 = 0.12;
 const PENALTY: f64 = 100.0;
 /// Length of a thread with one contact point, mm.
-const LENGTH: f64 = 0.15625;
+const LENGTH: f64 = 0.109375;
 
 /// A body, and threads of one contact point each.
 struct Scene {

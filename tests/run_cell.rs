@@ -115,7 +115,7 @@ fn a_run_leaves_what_the_readme_says() {
         assert!(!summary[*key].is_null(), "{key} is missing");
     }
     assert_eq!(summary["verdict"], "finished");
-    assert_eq!((summary["hexes"].as_u64(), summary["beams"].as_u64()), (Some(1920), Some(480)));
+    assert_eq!((summary["hexes"].as_u64(), summary["beams"].as_u64()), (Some(1920), Some(720)));
     assert_eq!(summary["case"]["fabric"]["friction"], 0.2);
 
     let balance: Vec<f64> = column(&dir.join("history.csv"), "e_balance_error");

@@ -146,7 +146,7 @@ fn an_accuracy_fills_what_a_case_leaves_out() {
         read(Path::new("cases/unit_cell_shear.json"), &sets)
     };
     let plain = cell(&[]).unwrap().case;
-    for word in ["preview", "engineering", "reference"] {
+    for word in ["preview", "paper", "engineering", "reference"] {
         let loaded = cell(&[&format!("accuracy={word}")]).unwrap();
         assert!(loaded.case.resolution != plain.resolution, "{word}");
         let full = serde_json::to_value(&loaded.case).unwrap();

@@ -13,6 +13,8 @@ pub enum Accuracy {
     /// A first look: half the columns (`resolution.warp_columns` 9, `resolution.weft_columns` 4), half the slices
     /// (`resolution.slice_mm` 0.606), and the beams and steps of `engineering`.
     Preview,
+    /// The mesh of the paper (Zheng et al.), 480 beams in the shipped cell: `resolution.beams_per_lap` 60.
+    Paper,
     /// For results: `resolution.beams_per_lap` 120, and steps up to 1 µs (`integration.dt_max_s` 1e-6) with elements that are
     /// heavy enough for them (`effects.contact_mass.least_limit_s` 2.3e-6).
     Engineering,
@@ -30,6 +32,7 @@ impl Accuracy {
                 fill(&mut fields, &Self::Engineering.fields());
                 fields
             }
+            Self::Paper => json!({ "resolution": { "beams_per_lap": 60 } }),
             Self::Engineering => json!({
                 "resolution": { "beams_per_lap": 120 },
                 "integration": { "dt_max_s": 1e-6 },

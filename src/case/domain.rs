@@ -253,7 +253,7 @@ pub struct Resolution {
     /// Length of a hexahedron along the fibre, mm; rounded to a whole number over the yarn. Default 0.303.
     #[schemars(range(min = 0.001, max = 50))]
     pub slice_mm: f64,
-    /// Beams per lap (a loop and its underlap), graded by curvature. Default 60.
+    /// Beams per lap (a loop and its underlap), graded by curvature. Default 90.
     #[schemars(range(min = 8, max = 10_000))]
     pub beams_per_lap: usize,
     /// Share of `beams_per_lap` by which laps differ from it, at most: some have more beams and others as many less, so that loops
@@ -273,7 +273,7 @@ impl Default for Resolution {
             weft_columns: 8,
             layers: 2,
             slice_mm: 0.303,
-            beams_per_lap: 60,
+            beams_per_lap: 90,
             lap_variation: 0.05,
             finer: 1.0,
         }

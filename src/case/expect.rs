@@ -30,8 +30,8 @@ pub struct Expect {
     pub thickness_ratio: Option<Bounds>,
     /// Largest force in a beam at the end, N.
     pub tension_n: Option<Bounds>,
-    /// Force in the last beam of the first thread over that in its first, mean over the second half of the last load step: it goes up and
-    /// down as beams come off what they slide on.
+    /// Force in the last beam of the first thread over that in its first, mean over the middle half of the last load step, while it slides fast:
+    /// the ratio goes up and down as beams come off what they slide on.
     pub tension_ratio: Option<Bounds>,
     /// Another case that this one must agree with. `null` for none.
     pub same_as: Option<SameAs>,

@@ -40,7 +40,7 @@ pub struct Observed {
     pub thickness_ratio: f64,
     /// Largest force in a beam at the end, N.
     pub tension: f64,
-    /// Force in the last beam of the first thread over that in its first, at looks in the second half of the last load step.
+    /// Force in the last beam of the first thread over that in its first, at looks in the middle half of the last load step.
     pub tension_ratios: Vec<f64>,
 }
 
@@ -144,7 +144,7 @@ impl Way {
         self.ledger.look(simulation.energies());
         simulation.advance(end, |s| {
             self.look(s);
-            if s.time() > 0.5 * (start + end) {
+            if (s.time() - 0.5 * (start + end)).abs() < 0.25 * (end - start) {
                 self.seen.slide(s);
             }
             retries.due(s) || s.step() >= longest
