@@ -160,7 +160,7 @@ fn overrides_reach_everything() {
     let loaded = read(Path::new(GOOD), &sets.map(String::from)).unwrap();
     assert_eq!(loaded.fabric.unwrap().stitch.thermal_strain, -0.1);
     let case = serde_json::to_value(&loaded.case).unwrap();
-    assert_eq!(case["steps"][2], json!({ "shear": { "angle_deg": 30.0, "time_s": 1.2e-2 } }));
+    assert_eq!(case["steps"][2], json!({ "shear": { "angle_deg": 30.0, "time_s": 1.4e-2 } }));
     assert_eq!(case["title"], "Another");
     assert_eq!(case["effects"]["contact"]["skin_mm"], 0.1);
     assert_eq!(case["effects"]["damping"], Value::Null);

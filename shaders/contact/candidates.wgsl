@@ -233,7 +233,7 @@ fn candidates(item: u32) {
         atomicOr(&status[FLAGS], SLOTS_FULL);
         return;
     }
-    for (var i = count; i < params.faces; i++) {
+    for (var i = count; i < bound(params.faces, arrayLength(&near)); i++) {
         near[first + i] = EMPTY;
     }
     near[first - MADE] = near[first - MADE] + 1u;

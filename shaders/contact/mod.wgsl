@@ -59,6 +59,12 @@ struct Params {
 
 @group(2) @binding(1) var<uniform> params: Params;
 
+// How often a loop runs, of at most `most`, the length of what it runs over. Mesa's software device would take a bound that follows
+// from uniforms alone for a constant, unroll the loop, and compile the shader again for every dispatch.
+fn bound(count: u32, most: u32) -> u32 {
+    return min(count, most);
+}
+
 // When candidates were found, see the twin.
 const WITH_ALL: u32 = 0u;
 const SINCE: u32 = 1u;

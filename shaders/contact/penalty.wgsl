@@ -392,7 +392,8 @@ fn share_out(here: Point) {
 // The place of a body among the touches of a point; if it `begins` to touch, a free one; else `params.slots`.
 fn place_of(item: u32, body: u32, begins: bool) -> u32 {
     var free = params.slots;
-    for (var slot = 0u; slot < params.slots; slot++) {
+    let slots = bound(params.slots, arrayLength(&keys));
+    for (var slot = 0u; slot < slots; slot++) {
         let known = keys[(MADE + params.slots) * item + MADE + slot];
         if known == body {
             return slot;
@@ -429,6 +430,7 @@ fn settle(here: Point, body: u32, depth: f32, pushed: ptr<function, Pushed>, rub
 }
 
 fn penalty(item: u32) {
+    let faces_listed = bound(params.faces, arrayLength(&near));
     let first = (MADE + params.faces) * nodes[CARRIED * item + CARRIED - 1u];
     let full_radius = points[POINT * item + 5u];
     var size = 0.0;
@@ -442,7 +444,7 @@ fn penalty(item: u32) {
     if keys[made] != near[first] {
         // a new list: all faces are looked at, wherever the point may be
         keys[made] = near[first];
-        for (var i = 0u; i < GAPS + params.faces; i++) {
+        for (var i = 0u; i < GAPS + faces_listed; i++) {
             gaps[first_gap + i] = 0.0;
         }
         gaps[first_gap + INNER] = params.depth;
@@ -465,11 +467,11 @@ fn penalty(item: u32) {
     sums[SUMS * item + SUM_ENERGY] = 0.0;
     let list = first + MADE;
     var end = 0u;
-    while end < params.faces && near[list + end] != EMPTY {
+    while end < faces_listed && near[list + end] != EMPTY {
         let start = end;
         let body = body_of(near[list + end]);
         var gap = params.skin;
-        while end < params.faces && near[list + end] != EMPTY && body_of(near[list + end]) == body {
+        while end < faces_listed && near[list + end] != EMPTY && body_of(near[list + end]) == body {
             let left = gaps[first_gap + GAPS + end] - closed;
             gaps[first_gap + GAPS + end] = left;
             gap = min(gap, left);

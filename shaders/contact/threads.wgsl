@@ -113,7 +113,7 @@ fn is_near(beam: u32, line: Piece, other: u32, image: vec2<i32>) -> bool {
 // Moves a slot, of all that there are, to another one.
 fn move_slot(slot: u32, to: u32) {
     keys[to] = keys[slot];
-    for (var i = 0u; i < params.state; i++) {
+    for (var i = 0u; i < bound(params.state, arrayLength(&states)); i++) {
         states[params.state * to + i] = states[params.state * slot + i];
     }
 }
@@ -163,7 +163,7 @@ fn insert(beam: u32, line: Piece, near: u32, count: u32) -> u32 {
             move_slot(first + to - 1u, first + to);
         }
         keys[first + place] = pair;
-        for (var i = 0u; i < params.state; i++) {
+        for (var i = 0u; i < bound(params.state, arrayLength(&states)); i++) {
             states[params.state * (first + place) + i] = 0.0;
         }
     }
