@@ -92,6 +92,7 @@ struct Push {
 // What a body does to a point, see the twin.
 struct Pushed {
     nearest: Nearest,
+    inside: bool,
     push: vec3<f32>,
     energy: f32,
     pressing: f32,
@@ -187,6 +188,7 @@ fn out_energy(here: Point, depth: f32) -> f32 {
 fn push_out(here: Point, pushed: ptr<function, Pushed>) -> f32 {
     let known = (*pushed).nearest;
     let size = out_force(here, known.distance);
+    (*pushed).inside = true;
     (*pushed).push = known.away * -size + (*pushed).push;
     (*pushed).energy = (*pushed).energy + out_energy(here, known.distance);
     (*pushed).pressing = (*pushed).pressing + size;
@@ -345,16 +347,15 @@ fn rub(here: Point, pushed: ptr<function, Pushed>, touch: u32) -> Rubbed {
     return Rubbed(rubbing, rows);
 }
 
-// Adds what a face does to a point, which may be `inside` behind the nearest one, to the nodes, with its share of what damping and
-// friction do.
-fn press(here: Point, entry: u32, inside: bool, pushed: ptr<function, Pushed>, rubbed: Rubbed) {
+// Adds what a face does to a point to the nodes, with its share of what damping and friction do.
+fn press(here: Point, entry: u32, pushed: ptr<function, Pushed>, rubbed: Rubbed) {
     let seen = of_key(entry);
     let around = corners(seen.body, seen.image, here.base, here.aside);
     let q = around.current;
     let point = closest(q, patch_of(q));
     var push = push_of_face(here, q, marks(seen.body), point);
     let is_nearest = entry == (*pushed).nearest.entry;
-    if inside && is_nearest {
+    if (*pushed).inside && is_nearest {
         add_push(&push, point.weights, point.away * -1.0, out_force(here, point.distance), out_energy(here, point.distance));
     }
     var share = select(0.0, 1.0, is_nearest);
@@ -483,9 +484,8 @@ fn penalty(item: u32) {
         }
         var pushed = Pushed();
         least = min(least, look(here, list, first_gap + GAPS, vec2<u32>(start, end), most, &pushed));
-        let inside = is_behind(&pushed);
         var depth = 0.0;
-        if inside {
+        if is_behind(&pushed) {
             depth = push_out(here, &pushed);
         }
         inner = max(inner, depth);
@@ -494,7 +494,7 @@ fn penalty(item: u32) {
             touching = true;
             for (var i = start; i < end; i++) {
                 if gaps[first_gap + GAPS + i] < 0.0 || near[list + i] == pushed.nearest.entry {
-                    press(here, near[list + i], inside, &pushed, rubbed);
+                    press(here, near[list + i], &pushed, rubbed);
                 }
             }
         }

@@ -232,6 +232,8 @@ impl<R: Real> Push<R> {
 /// What a body does to a point.
 struct Pushed<R> {
     nearest: Nearest<R>,
+    /// Whether the point is pushed out from behind the nearest face.
+    inside: bool,
     /// Resultant of the elastic forces on the point, N, and their energy, mJ; see [`Push`].
     push: Vector<R>,
     energy: R,
@@ -253,7 +255,7 @@ impl<R: Real> Pushed<R> {
         let nearest = Nearest { found: false, entry: EMPTY, away: [zero; 3], distance: zero, height: zero };
         let (push, motion, apart) = ([zero; 3], [zero; 3], [zero; 3]);
         let (energy, pressing, features, shared, inverse) = (zero, zero, zero, zero, zero);
-        Self { nearest, push, energy, pressing, features, shared, motion, apart, inverse }
+        Self { nearest, inside: false, push, energy, pressing, features, shared, motion, apart, inverse }
     }
 
     /// Whether a place is nearer than what is known. Of faces whose common edge or corner is nearest, the one that is seen most
@@ -284,6 +286,7 @@ impl<R: Real> Pushed<R> {
     fn push_out<const N: usize>(&mut self, at: &Point<R, N>) -> R {
         let Nearest { away, distance, .. } = self.nearest;
         let (force, energy) = out(at, distance);
+        self.inside = true;
         self.push = fma(away, -force, self.push);
         self.energy = self.energy + energy;
         self.pressing = self.pressing + force;
@@ -367,14 +370,13 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
             let (entries, gaps) = (&list[first..end], GAPS + first..GAPS + end);
             let mut pushed = self.look(at, entries, &mut kept.gaps[gaps.clone()], most);
             least = kept.gaps[gaps.clone()].iter().fold(least, |least, gap| least.min(*gap));
-            let inside = pushed.is_behind(&self.params);
-            let depth = if inside { pushed.push_out(at) } else { zero };
+            let depth = if pushed.is_behind(&self.params) { pushed.push_out(at) } else { zero };
             inner = inner.max(depth);
             if let Some(rubbed) = self.settle(at, body, depth, &mut pushed, kept) {
                 touching = true;
                 for (entry, i) in entries.iter().zip(gaps) {
                     if kept.gaps[i] < zero || *entry == pushed.nearest.entry {
-                        self.press(at, *entry, inside, &pushed, &rubbed, &mut own, kept.sums);
+                        self.press(at, *entry, &pushed, &rubbed, &mut own, kept.sums);
                     }
                 }
             }
@@ -484,14 +486,12 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         pushed
     }
 
-    /// Adds what a face does to a point, which may be `inside` behind the nearest one, to the nodes, with its share of what damping
-    /// and friction do.
+    /// Adds what a face does to a point to the nodes, with its share of what damping and friction do.
     #[inline(always)]
     fn press<const N: usize>(
         &self,
         at: &Point<R, N>,
         entry: u32,
-        inside: bool,
         pushed: &Pushed<R>,
         rubbed: &Rubbed<R>,
         own: &mut [i32; 3],
@@ -503,7 +503,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         let point = closest(q, &Patch::new(q));
         let mut push = Push::of_face(at, q, self.surface.marks(face), &point);
         let (zero, is_nearest) = (R::from_f64(0.0), entry == pushed.nearest.entry);
-        if inside && is_nearest {
+        if pushed.inside && is_nearest {
             let (force, energy) = out(at, point.distance);
             push.add(point.weights, scale(point.away, R::from_f64(-1.0)), force, energy);
         }

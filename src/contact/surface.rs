@@ -28,7 +28,7 @@ pub fn coded(node: usize, image: [i32; 2]) -> u32 {
 /// Node and image of a [`coded`] one.
 #[inline(always)]
 pub fn of_coded(coded: u32) -> (usize, [i32; 2]) {
-    ((coded & (1 << 26) - 1) as usize, [(coded >> 26 & 3) as i32 - 1, (coded >> 28) as i32 - 1])
+    ((coded & ((1 << 26) - 1)) as usize, [(coded >> 26 & 3) as i32 - 1, (coded >> 28) as i32 - 1])
 }
 
 /// Marks of a face: the edges (from corner `a` to the next one) and the corners that it owns, along which of x and y its body
