@@ -89,9 +89,18 @@ struct Push {
     count: f32,
 }
 
+// A face of a list that was looked at.
+struct Seen {
+    entry: u32,
+    corners: Corners,
+    point: Closest,
+    push: Push,
+}
+
 // What a body does to a point, see the twin.
 struct Pushed {
     nearest: Nearest,
+    last: Seen,
     inside: bool,
     push: vec3<f32>,
     energy: f32,
@@ -226,18 +235,29 @@ fn pull(item: u32, around: Corners, pulled: array<vec3<f32>, 4>) {
     }
 }
 
+// The corners of a face.
+fn corners_of(here: Point, entry: u32) -> Corners {
+    let face = of_key(entry);
+    return corners(face.body, face.image, here.base, here.aside);
+}
+
+// Looks at a face closely.
+fn see(here: Point, entry: u32, around: Corners, shape: Patch) -> Seen {
+    let point = closest(around.current, shape);
+    return Seen(entry, around, point, push_of_face(here, around.current, marks(of_key(entry).body), point));
+}
+
 // Adds what a face does to a point; returns the gap, or as much as is sure to be left of it.
 fn face_push(here: Point, entry: u32, most: f32, pushed: ptr<function, Pushed>) -> f32 {
-    let seen = of_key(entry);
-    let around = corners(seen.body, seen.image, here.base, here.aside);
-    let q = around.current;
-    let shape = patch_of(q);
+    let around = corners_of(here, entry);
+    let shape = patch_of(around.current);
     let sure = nearest(shape) - here.radius;
     if sure > most {
         return sure;
     }
-    let point = closest(q, shape);
-    let push = push_of_face(here, q, marks(seen.body), point);
+    let seen = see(here, entry, around, shape);
+    let point = seen.point;
+    let push = seen.push;
     let pulls = push.pull;
     (*pushed).push = (*pushed).push + ((pulls[0] + pulls[1]) + (pulls[2] + pulls[3])) * -1.0;
     (*pushed).energy = (*pushed).energy + push.energy;
@@ -249,6 +269,9 @@ fn face_push(here: Point, entry: u32, most: f32, pushed: ptr<function, Pushed>) 
     }
     let gap = point.distance - here.radius;
     let size = here.stiff * max(-gap, 0.0);
+    if size > 0.0 || nearer {
+        (*pushed).last = seen;
+    }
     let alone = !((*pushed).shared_force > 0.0);
     if size > 0.0 || alone && nearer {
         let share = select(1.0, size, size > 0.0);
@@ -349,11 +372,14 @@ fn rub(here: Point, pushed: ptr<function, Pushed>, touch: u32) -> Rubbed {
 
 // Adds what a face does to a point to the nodes, with its share of what damping and friction do.
 fn press(here: Point, entry: u32, pushed: ptr<function, Pushed>, rubbed: Rubbed) {
-    let seen = of_key(entry);
-    let around = corners(seen.body, seen.image, here.base, here.aside);
-    let q = around.current;
-    let point = closest(q, patch_of(q));
-    var push = push_of_face(here, q, marks(seen.body), point);
+    var seen = (*pushed).last;
+    if entry != seen.entry {
+        let again = corners_of(here, entry);
+        seen = see(here, entry, again, patch_of(again.current));
+    }
+    let around = seen.corners;
+    let point = seen.point;
+    var push = seen.push;
     let is_nearest = entry == (*pushed).nearest.entry;
     if (*pushed).inside && is_nearest {
         add_push(&push, point.weights, point.away * -1.0, out_force(here, point.distance), out_energy(here, point.distance));
@@ -483,6 +509,7 @@ fn penalty(item: u32) {
             continue;
         }
         var pushed = Pushed();
+        pushed.last.entry = EMPTY;
         least = min(least, look(here, list, first_gap + GAPS, vec2<u32>(start, end), most, &pushed));
         var depth = 0.0;
         if is_behind(&pushed) {

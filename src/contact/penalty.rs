@@ -160,6 +160,7 @@ fn out<R: Real, const N: usize>(at: &Point<R, N>, depth: R) -> (R, R) {
 }
 
 /// How a face, with the edges and corners that it owns, pushes a point.
+#[derive(Clone, Copy)]
 struct Push<R> {
     /// What acts on its corners, N.
     pull: [Vector<R>; 4],
@@ -229,9 +230,31 @@ impl<R: Real> Push<R> {
     }
 }
 
+/// A face of a list that was looked at.
+#[derive(Clone, Copy)]
+struct Seen<R> {
+    entry: u32,
+    corners: Corners<R>,
+    point: Closest<R>,
+    push: Push<R>,
+}
+
+impl<R: Real> Seen<R> {
+    #[inline(always)]
+    fn none() -> Self {
+        let zero = R::from_f64(0.0);
+        let corners = Corners { nodes: [0; 4], reference: [[zero; 3]; 4], current: [[zero; 3]; 4] };
+        let (weights, away) = ([zero; 4], [zero; 3]);
+        let point = Closest { weights, away, distance: zero, height: zero, interior: false };
+        Self { entry: EMPTY, corners, point, push: Push::none() }
+    }
+}
+
 /// What a body does to a point.
 struct Pushed<R> {
     nearest: Nearest<R>,
+    /// The last face that pushes or was nearest: mostly the only one, which need not be looked at again.
+    last: Seen<R>,
     /// Whether the point is pushed out from behind the nearest face.
     inside: bool,
     /// Resultant of the elastic forces on the point, N, and their energy, mJ; see [`Push`].
@@ -255,7 +278,19 @@ impl<R: Real> Pushed<R> {
         let nearest = Nearest { found: false, entry: EMPTY, away: [zero; 3], distance: zero, height: zero };
         let (push, motion, apart) = ([zero; 3], [zero; 3], [zero; 3]);
         let (energy, pressing, features, shared, inverse) = (zero, zero, zero, zero, zero);
-        Self { nearest, inside: false, push, energy, pressing, features, shared, motion, apart, inverse }
+        Self {
+            nearest,
+            last: Seen::none(),
+            inside: false,
+            push,
+            energy,
+            pressing,
+            features,
+            shared,
+            motion,
+            apart,
+            inverse,
+        }
     }
 
     /// Whether a place is nearer than what is known. Of faces whose common edge or corner is nearest, the one that is seen most
@@ -426,23 +461,25 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
     /// exceed `most` need not be looked at closely.
     #[inline(always)]
     fn face<const N: usize>(&self, at: &Point<R, N>, entry: u32, most: R, pushed: &mut Pushed<R>) -> R {
-        let (face, image) = of_key(entry);
-        let corners = self.surface.corners(face, image, at.nodes[0], at.from);
-        let q = &corners.current;
-        let patch = Patch::new(q);
+        let corners = self.corners(at, entry);
+        let patch = Patch::new(&corners.current);
         let sure = patch.nearest() - at.radius;
         if sure > most {
             return sure;
         }
-        let point = closest(q, &patch);
-        pushed.add(&Push::of_face(at, q, self.surface.marks(face), &point));
-        let (zero, is_nearer) = (R::from_f64(0.0), pushed.is_nearer(&point));
+        let seen = self.see(at, entry, corners, &patch);
+        let Seen { point, push, .. } = &seen;
+        pushed.add(push);
+        let (zero, is_nearer) = (R::from_f64(0.0), pushed.is_nearer(point));
         if is_nearer {
-            let Closest { away, distance, height, .. } = point;
+            let Closest { away, distance, height, .. } = *point;
             pushed.nearest = Nearest { found: true, entry, away, distance, height };
         }
         let gap = point.distance - at.radius;
         let force = at.penalty * (-gap).max(zero);
+        if force > zero || is_nearer {
+            pushed.last = seen;
+        }
         let alone = !(pushed.shared > zero);
         if force > zero || alone && is_nearer {
             let share = if force > zero { force } else { R::from_f64(1.0) };
@@ -486,6 +523,21 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         pushed
     }
 
+    /// The corners of a face.
+    #[inline(always)]
+    fn corners<const N: usize>(&self, at: &Point<R, N>, entry: u32) -> Corners<R> {
+        let (face, image) = of_key(entry);
+        self.surface.corners(face, image, at.nodes[0], at.from)
+    }
+
+    /// Looks at a face closely.
+    #[inline(always)]
+    fn see<const N: usize>(&self, at: &Point<R, N>, entry: u32, corners: Corners<R>, patch: &Patch<R>) -> Seen<R> {
+        let point = closest(&corners.current, patch);
+        let push = Push::of_face(at, &corners.current, self.surface.marks(of_key(entry).0), &point);
+        Seen { entry, corners, point, push }
+    }
+
     /// Adds what a face does to a point to the nodes, with its share of what damping and friction do.
     #[inline(always)]
     fn press<const N: usize>(
@@ -497,11 +549,12 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         own: &mut [i32; 3],
         sums: &mut [R],
     ) {
-        let (face, image) = of_key(entry);
-        let corners = self.surface.corners(face, image, at.nodes[0], at.from);
-        let q = &corners.current;
-        let point = closest(q, &Patch::new(q));
-        let mut push = Push::of_face(at, q, self.surface.marks(face), &point);
+        let Seen { corners, point, mut push, .. } = if entry == pushed.last.entry {
+            pushed.last
+        } else {
+            let corners = self.corners(at, entry);
+            self.see(at, entry, corners, &Patch::new(&corners.current))
+        };
         let (zero, is_nearest) = (R::from_f64(0.0), entry == pushed.nearest.entry);
         if pushed.inside && is_nearest {
             let (force, energy) = out(at, point.distance);
