@@ -8,12 +8,9 @@
 //! κ the curvature, which comes from the directions of both neighbours and the lengths between their middles and the beam's.
 //! A point is thus carried by four nodes with constant weights.
 
-/// Largest distance of points over the radius.
-const SPACING: f64 = 1.0;
-
 /// How many points a beam of a length needs, both in mm.
 pub fn points(length: f64, radius: f64) -> usize {
-    (libm::ceil(length / (SPACING * radius)) as usize).max(1)
+    (libm::ceil(length / radius) as usize).max(1)
 }
 
 /// Weights of a point at a share of a beam: of its ends, of the node before it and of the one behind it. Lengths of the beam before,

@@ -4,7 +4,7 @@
 //! items, and a body's faces follow each other. It holds no state but how often it was made: what touches is known by its body.
 //! Carriers near nothing that has moved relative to them (see [`super::travel`]) keep their lists.
 
-use super::grid::{BOX, Moved, SLAB, absolute, cell_index, cells, has_moved, inverse, motion, pull_back};
+use super::grid::{BOX, Moved, SLAB, absolute, cell_index, cells, has_moved, inverse, motion, pull_back, stretch};
 use super::surface::{CARRIED, POINT, Surface, entry, of_coded};
 use super::{EMPTY, Params, found, of_key, status};
 use crate::kernel::lane::{Lane, Real};
@@ -195,7 +195,7 @@ fn run<R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, items: Range<u
         period: params.period,
     };
     let inverse = inverse::<_, PERIODIC>(&io.row.gradient);
-    let stretch = [0, 1].map(|k| (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt());
+    let stretch = stretch(&inverse);
     let (carriers, nodes, points, slabs) = (io.uints(CARRIERS), io.uints(NODES), io.scalars(POINTS), io.uints(SLABS));
     let (counts, lists, boxes) = (io.uints(COUNTS), io.uints(ITEMS), io.scalars(BOXES));
     let (mut near, mut when) = (io.own::<u32>(NEAR), io.own::<u32>(FOUND));

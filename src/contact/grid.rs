@@ -78,6 +78,12 @@ pub fn inverse<R: Real, const PERIODIC: bool>(gradient: &[[R; 3]; 3]) -> [[R; 2]
     [[d * scale, -(b * scale)], [-(c * scale), a * scale]]
 }
 
+/// How much longer a distance in space can be in the pulled-back plane, along its axes.
+#[inline(always)]
+pub fn stretch<R: Real>(inverse: &[[R; 2]; 2]) -> [R; 2] {
+    [0, 1].map(|k| (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt())
+}
+
 /// A vector in the pulled-back plane.
 #[inline(always)]
 pub fn pull_back<R: Real>(inverse: &[[R; 2]; 2], v: [R; 3]) -> [R; 2] {
@@ -235,7 +241,7 @@ impl<'a, R: Real> Grid<'a, R> {
         let Bounds { low, high, moved } = bounds;
         let (least, greatest): ([R; 3], [R; 3]) = moved.bounds();
         let (base, height) = absolute(io, [REFERENCE, QUANTA, REMAINDER], inverse, origin);
-        let half = R::from_f64(0.5);
+        let (half, stretch) = (R::from_f64(0.5), stretch(inverse));
         boxes.item(0, item).copy_from_slice(&[
             base[0] + half * (low[0] + high[0]),
             base[1] + half * (low[1] + high[1]),
@@ -251,8 +257,7 @@ impl<'a, R: Real> Grid<'a, R> {
             greatest[2],
         ]);
         let range = |k: usize| {
-            let reach = reach * (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt();
-            let room = reach + R::from_f64(ROUNDING);
+            let room = reach * stretch[k] + R::from_f64(ROUNDING);
             cells::<R, PERIODIC>(params, k, base[k] + low[k] - room, base[k] + high[k] + room)
         };
         let ((x0, x1), (y0, y1)) = (range(0), range(1));

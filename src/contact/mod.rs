@@ -77,8 +77,6 @@ pub struct Params {
 pub const fn slot_state(friction: bool) -> usize {
     if friction { 4 } else { 1 }
 }
-/// Most numbers of a slot.
-pub const MOST_STATE: usize = slot_state(true);
 
 /// What a carrier or a beam notes of its candidates: found when everything was last searched, or since, or still to be found.
 pub mod found {

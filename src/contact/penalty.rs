@@ -54,6 +54,7 @@ pub const ELASTIC: usize = 2;
 pub const fn touch(friction: bool) -> usize {
     if friction { ELASTIC + 3 } else { ELASTIC }
 }
+
 const NODES: usize = 0;
 const POINTS: usize = 1;
 const FACES: usize = 2;
@@ -70,11 +71,6 @@ const SUM: usize = 12;
 const FORCE: usize = 13;
 const STIFFNESS: usize = 14;
 const STATUS: usize = 15;
-
-/// Nodes that carry a point: those of a beam and one to either side, or one node of a yarn.
-pub const fn carried_by(thread: bool) -> usize {
-    if thread { 4 } else { 1 }
-}
 
 /// Contact forces of points of threads (`THREAD`) or of nodes of yarn surfaces on yarns.
 pub struct Penalty<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool>;
