@@ -392,7 +392,7 @@ fn complaint(end: &End) -> Option<String> {
 
 /// Share of accepted cases that are quiet and right, in per cent. Of the first forty fabrics of seed 1 and the first twenty of seeds 2
 /// to 4 it is 97: three are stopped by the guard on penetration, of threads into threads, where they are looked at more often.
-const HELD: u64 = 95;
+const HELD: u64 = 99;
 
 #[test]
 fn random_fabrics_run_quietly_and_hold_their_checks() {

@@ -56,8 +56,8 @@ pub struct Contact {
     /// Penalty of a yarn surface per area, N/mm³. Default 65 (5 N/mm at a node of 0.078 mm²).
     #[schemars(range(min = 1e-6, max = 1e9))]
     pub yarn_penalty_n_mm3: f64,
-    /// Penalty of threads on threads per length of contact, N/mm². Default 140, as of threads on yarns: threads that cross at right
-    /// angles are pressed together as by Hertz with a contact modulus E* of twice that, in MPa, threads of 0.1 mm by 9 µm with 0.1 N.
+    /// Penalty of threads on threads per length of contact, N/mm². Default 660. Threads that cross at right angles are pressed
+    /// together as by Hertz with a contact modulus E* of twice that, in MPa: threads of 0.1 mm by 3 µm with 0.1 N.
     #[schemars(range(min = 1e-6, max = 1e9))]
     pub thread_thread_penalty_n_mm2: f64,
     /// Stiffness of the ties that hold cut threads at yarns, N/mm. Default 30, as of a node of a thread on a yarn.
@@ -88,7 +88,7 @@ impl Default for Contact {
             thread_thread: true,
             thread_penalty_n_mm2: 140.0,
             yarn_penalty_n_mm3: 65.0,
-            thread_thread_penalty_n_mm2: 140.0,
+            thread_thread_penalty_n_mm2: 660.0,
             tie_n_mm: 30.0,
             friction: true,
             tangential_ratio: 0.5,

@@ -10,7 +10,8 @@ use std::path::PathBuf;
 pub struct Expect {
     /// How the run ends. Default `finished`.
     pub verdict: Verdict,
-    /// Largest error of the energy balance at any time, without its sign, over the largest energy of the run.
+    /// Largest error of the energy balance at any time, before a guard stops the run, without its sign, over the largest energy of
+    /// the run.
     pub energy_balance: Option<Bounds>,
     /// Smallest det F of all hexahedra at any time.
     pub min_jacobian: Option<Bounds>,

@@ -3,6 +3,7 @@
 use super::colour::{Rgb, encode};
 use super::file::replace;
 use crate::error::Result;
+use rayon::prelude::*;
 use std::io;
 use std::path::Path;
 
@@ -45,20 +46,11 @@ impl Image {
         }
     }
 
-    /// Pastes an image that is `factor` times finer, averaging its pixels.
-    pub fn paste(&mut self, left: usize, top: usize, fine: &Image, factor: usize) {
-        let weight = 1.0 / (factor * factor) as f32;
-        for y in 0..fine.height / factor {
-            for x in 0..fine.width / factor {
-                let mut sum = [0.0_f32; 3];
-                for row in 0..factor {
-                    for column in 0..factor {
-                        let pixel = fine.pixel(x * factor + column, y * factor + row);
-                        (0..3).for_each(|i| sum[i] += weight * pixel[i]);
-                    }
-                }
-                self.cover((left + x) as i64, (top + y) as i64, sum, 1.0);
-            }
+    /// Pastes an image; what does not fit is left out.
+    pub fn paste(&mut self, left: usize, top: usize, other: &Image) {
+        let fits = other.width.min(self.width.saturating_sub(left));
+        for (y, row) in other.pixels.chunks(other.width).enumerate().take(self.height.saturating_sub(top)) {
+            self.pixels[(top + y) * self.width + left..][..fits].copy_from_slice(&row[..fits]);
         }
     }
 
@@ -69,11 +61,12 @@ impl Image {
 
     /// Writes the image, whole or not at all.
     pub fn write_png(&self, path: &Path) -> Result<()> {
-        let bytes: Vec<u8> = self.pixels.iter().flat_map(|&p| encode(p)).collect();
+        let bytes: Vec<u8> = self.pixels.par_iter().flat_map_iter(|&p| encode(p)).collect();
         replace(path, |w| {
             let mut encoder = png::Encoder::new(w, self.width as u32, self.height as u32);
             encoder.set_color(png::ColorType::Rgb);
             encoder.set_depth(png::BitDepth::Eight);
+            encoder.set_compression(png::Compression::Fast);
             let mut writer = encoder.write_header().map_err(io::Error::other)?;
             writer.write_image_data(&bytes).map_err(io::Error::other)?;
             writer.finish().map_err(io::Error::other)
@@ -102,11 +95,10 @@ mod tests {
     }
 
     #[test]
-    fn paste_averages() {
-        let mut fine = Image::new(4, 2, [0.0; 3]);
-        fine.fill([0.0, 0.0, 1.0, 2.0], [1.0; 3]);
-        let mut image = Image::new(2, 1, [0.0; 3]);
-        image.paste(0, 0, &fine, 2);
-        assert_eq!([image.pixel(0, 0)[0], image.pixel(1, 0)[0]], [0.5, 0.0]);
+    fn what_does_not_fit_is_left_out() {
+        let mut image = Image::new(3, 2, [0.0; 3]);
+        image.paste(1, 1, &Image::new(5, 2, [1.0; 3]));
+        let bright = (0..6).filter(|i| image.pixel(i % 3, i / 3) == [1.0; 3]).collect::<Vec<_>>();
+        assert_eq!(bright, [4, 5]);
     }
 }

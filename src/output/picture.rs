@@ -18,9 +18,6 @@ pub const CELLS: f32 = 1.5;
 /// Widths that can be asked for, px.
 pub const WIDTHS: RangeInclusive<usize> = 300..=6000;
 
-/// Samples per pixel and direction.
-const FINER: usize = 2;
-
 /// Size of the title over that of other letters, unless it takes the room of what stands beside it.
 const TITLE: f32 = 1.5;
 
@@ -221,9 +218,8 @@ impl Sheet {
     ) {
         let Clip { low, high } = stage.clip;
         let centre = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), stage.middle];
-        let (width, height) = (width * FINER, height * FINER);
-        let camera = Camera { axes, centre, scale: scale * FINER as f32, width, height };
-        image.paste(left, top, &draw(scene, &stage.shifts, &camera, &stage.clip), FINER);
+        let camera = Camera { axes, centre, scale, width, height };
+        image.paste(left, top, &draw(scene, &stage.shifts, &camera, &stage.clip));
     }
 
     /// A bar of a round length, its right end at `right`, for `scale` px per mm.

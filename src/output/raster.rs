@@ -1,4 +1,5 @@
-//! Draws a scene: an orthographic depth buffer, then light on what is visible.
+//! Draws a scene: an orthographic depth buffer of several samples per pixel, then light on what is visible, once for each
+//! surface in a pixel.
 //!
 //! Light is a key light from the upper left with shadows marched through the depth buffer, a sky light darkened by nearby
 //! higher surfaces, and a sheen along fibres. Where the scene is cut by the clip rectangle one looks into a yarn at its inner
@@ -8,7 +9,6 @@ use super::colour::{self, Rgb};
 use super::image::Image;
 use super::scene::{Kind, Quad, Scene, add, cross, dot, scale, sub, unit};
 use rayon::prelude::*;
-use std::sync::LazyLock;
 
 /// Where the scene is seen from.
 #[derive(Debug, Clone, Copy)]
@@ -30,53 +30,99 @@ pub struct Clip {
     pub high: [f32; 2],
 }
 
-/// The surface seen at a pixel: depth toward the viewer, and which triangle of which quad in which image.
-#[derive(Clone, Copy)]
-struct Fragment {
-    depth: f32,
+impl Clip {
+    fn shows(&self, place: [f32; 2]) -> bool {
+        (0..2).all(|i| place[i] >= self.low[i] && place[i] <= self.high[i])
+    }
+}
+
+/// A triangle of a quad in an image.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Source {
     quad: u32,
     shift: u16,
     second: bool,
 }
 
-const NOTHING: Fragment = Fragment { depth: f32::NEG_INFINITY, quad: 0, shift: 0, second: false };
+/// What is seen at a sample, and its depth toward the viewer.
+#[derive(Clone, Copy)]
+struct Fragment {
+    depth: f32,
+    source: Option<Source>,
+}
+
+const NOTHING: Fragment = Fragment { depth: f32::NEG_INFINITY, source: None };
 
 /// Direction of the key light, in the axes of the camera.
 const KEY: [f32; 3] = [-0.48, 0.54, 0.69];
 
-/// Rows of pixels that are drawn as one piece of work.
+/// Samples per pixel and direction.
+const FINER: usize = 2;
+
+/// Rows of samples that are drawn as one piece of work.
 const BAND: usize = 64;
+
+/// How often triangles may cover the picture before the large ones are left out: those of a fabric of two plies do so about ten
+/// times, those of a state that came apart without end.
+const LAYERS: f32 = 100.0;
 
 /// The scene in all its periodic images, given by their displacements in mm.
 pub fn draw(scene: &Scene, shifts: &[[f32; 3]], camera: &Camera, clip: &Clip) -> Image {
-    let mut buffer = vec![NOTHING; camera.width * camera.height];
-    buffer.par_chunks_mut(camera.width * BAND).enumerate().for_each(|(band, rows)| {
-        for (s, &shift) in shifts.iter().enumerate() {
-            for (q, quad) in scene.quads.iter().enumerate() {
-                let corners = quad.corners.map(|c| camera.project(add(c, shift)));
-                for second in [false, true] {
-                    let seen = Fragment { quad: q as u32, shift: s as u16, second, ..NOTHING };
-                    fill(rows, band * BAND, camera, clip, triangle(second).map(|i| corners[i]), seen);
-                }
-            }
-        }
+    let fine = camera.finer();
+    let triangles = triangles(scene, shifts, &fine, clip);
+    let mut buffer = vec![NOTHING; fine.width * fine.height];
+    buffer.par_chunks_mut(fine.width * BAND).enumerate().for_each(|(band, rows)| {
+        triangles.iter().for_each(|triangle| triangle.fill(rows, band * BAND, &fine, clip));
     });
+    let heights = Heights::of(&buffer, camera);
     let mut image = Image::new(camera.width, camera.height, colour::background());
     image.rows_mut().par_chunks_mut(camera.width).enumerate().for_each(|(y, row)| {
         for (x, pixel) in row.iter_mut().enumerate() {
-            let seen = buffer[y * camera.width + x];
-            if seen.depth > f32::NEG_INFINITY {
-                let quad = &scene.quads[seen.quad as usize];
-                let surface = Surface::at(quad, shifts[usize::from(seen.shift)], seen.second, camera, [x, y]);
-                let (sky, sun) = (openness(&buffer, camera, x, y), sunlit(&buffer, camera, x, y));
-                *pixel = surface.lit(camera, sky, sun, scene.legend.is_some());
+            let samples: [[usize; 2]; FINER * FINER] =
+                std::array::from_fn(|i| [x * FINER + i % FINER, y * FINER + i / FINER]);
+            let seen = samples.map(|[x, y]| buffer[y * fine.width + x]);
+            let sources = seen.map(|fragment| fragment.source);
+            *pixel = [0.0; 3];
+            for (i, source) in sources.iter().enumerate().filter(|(i, source)| !sources[..*i].contains(source)) {
+                let share = sources.iter().filter(|other| *other == source).count() as f32 / sources.len() as f32;
+                let colour = source.map_or(colour::background(), |source| {
+                    let (quad, shift) = (&scene.quads[source.quad as usize], shifts[usize::from(source.shift)]);
+                    let surface = Surface::at(quad, shift, source.second, &fine, samples[i]);
+                    surface.lit(camera, heights.light(x, y, seen[i].depth), scene.legend.is_some())
+                });
+                *pixel = add(*pixel, scale(colour, share));
             }
         }
     });
     image
 }
 
+/// The triangles that reach into the picture.
+fn triangles(scene: &Scene, shifts: &[[f32; 3]], camera: &Camera, clip: &Clip) -> Vec<Triangle> {
+    let of_quad = |s: usize, q: usize| {
+        let corners = scene.quads[q].corners.map(|c| camera.project(add(c, shifts[s])));
+        [false, true].into_iter().filter_map(move |second| {
+            let source = Source { quad: q as u32, shift: s as u16, second };
+            Triangle::new(camera, clip, halves(second).map(|i| corners[i]), source)
+        })
+    };
+    let of_image = |s| (0..scene.quads.len()).into_par_iter().flat_map_iter(move |q| of_quad(s, q));
+    let mut all: Vec<Triangle> = (0..shifts.len()).into_par_iter().flat_map(of_image).collect();
+    let budget = LAYERS * (camera.width * camera.height) as f32;
+    if all.iter().map(Triangle::samples).sum::<f32>() > budget {
+        let fair = budget / all.len() as f32;
+        all.retain(|triangle| triangle.samples() <= fair);
+    }
+    all
+}
+
 impl Camera {
+    /// Of the samples.
+    fn finer(&self) -> Self {
+        let (width, height) = (self.width * FINER, self.height * FINER);
+        Self { scale: self.scale * FINER as f32, width, height, ..*self }
+    }
+
     /// Pixel coordinates and depth of a point.
     fn project(&self, point: [f32; 3]) -> [f32; 3] {
         let p = sub(point, self.centre);
@@ -94,8 +140,84 @@ impl Camera {
 }
 
 /// Corners of the two triangles of a quad.
-fn triangle(second: bool) -> [usize; 3] {
+fn halves(second: bool) -> [usize; 3] {
     if second { [0, 2, 3] } else { [0, 1, 2] }
+}
+
+/// A linear function of the place on the screen: its derivatives, and its value at the origin.
+type Plane = [f32; 3];
+
+/// A triangle on the screen.
+struct Triangle {
+    source: Source,
+    /// Weights of the corners, and depth.
+    weights: [Plane; 3],
+    depth: Plane,
+    /// Columns and rows of samples that it can cover.
+    columns: [usize; 2],
+    rows: [usize; 2],
+    /// Whether the clip rectangle cuts it.
+    cut: bool,
+}
+
+impl Triangle {
+    /// `None` where it has no area or is out of sight.
+    fn new(camera: &Camera, clip: &Clip, corners: [[f32; 3]; 3], source: Source) -> Option<Self> {
+        let reach = |k: usize, size: usize| {
+            let (low, high) = corners.iter().fold((f32::MAX, f32::MIN), |(l, h), c| (l.min(c[k]), h.max(c[k])));
+            (high > 0.0 && low < size as f32).then(|| [low.max(0.0) as usize, (high as usize + 1).min(size)])
+        };
+        let (columns, rows) = (reach(0, camera.width)?, reach(1, camera.height)?);
+        let [a, b, c] = corners;
+        let whole = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        if whole.abs() <= 1e-9 {
+            return None;
+        }
+        let edge = |p: [f32; 3], q: [f32; 3]| {
+            let (dx, dy) = ((p[1] - q[1]) / whole, (q[0] - p[0]) / whole);
+            [dx, dy, -(dx * p[0] + dy * p[1])]
+        };
+        let weights = [edge(b, c), edge(c, a), edge(a, b)];
+        let depth = std::array::from_fn(|i| (0..3).map(|k| weights[k][i] * corners[k][2]).sum());
+        let cut = corners.iter().any(|c| !clip.shows(camera.plane(c[0], c[1], c[2])));
+        Some(Self { source, weights, depth, columns, rows, cut })
+    }
+
+    /// Samples that are tried.
+    fn samples(&self) -> f32 {
+        let ([left, right], [up, down]) = (self.columns, self.rows);
+        (right - left) as f32 * (down - up) as f32
+    }
+
+    /// Draws it into rows of the depth buffer that start at row `top`.
+    fn fill(&self, rows: &mut [Fragment], top: usize, camera: &Camera, clip: &Clip) {
+        let bottom = top + rows.len() / camera.width;
+        for y in self.rows[0].max(top)..self.rows[1].min(bottom) {
+            let row = &mut rows[(y - top) * camera.width..][..camera.width];
+            let py = y as f32 + 0.5;
+            let along = |[dx, dy, at]: Plane| [dx, dy * py + at];
+            // the samples that an edge leaves, in their middles: dx · x + at ≥ 0
+            let (mut left, mut right) = (self.columns[0] as f32, self.columns[1] as f32);
+            for [dx, at] in self.weights.map(along) {
+                let border = -at / dx - 0.5;
+                if dx > 0.0 {
+                    left = left.max(border.ceil());
+                } else if dx < 0.0 {
+                    right = right.min(border.floor() + 1.0);
+                } else if at < 0.0 {
+                    right = left;
+                }
+            }
+            let [slope, start] = along(self.depth);
+            for x in left as usize..right as usize {
+                let px = x as f32 + 0.5;
+                let depth = slope * px + start;
+                if depth > row[x].depth && (!self.cut || clip.shows(camera.plane(px, py, depth))) {
+                    row[x] = Fragment { depth, source: Some(self.source) };
+                }
+            }
+        }
+    }
 }
 
 /// Weights of the corners of a screen triangle at a point; `None` where it has no area.
@@ -103,35 +225,6 @@ fn weights([a, b, c]: [[f32; 3]; 3], x: f32, y: f32) -> Option<[f32; 3]> {
     let edge = |p: [f32; 3], q: [f32; 3]| (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
     let whole = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     (whole.abs() > 1e-9).then(|| [edge(b, c) / whole, edge(c, a) / whole, edge(a, b) / whole])
-}
-
-/// Draws a triangle into rows of the depth buffer that start at row `top`.
-fn fill(rows: &mut [Fragment], top: usize, camera: &Camera, clip: &Clip, corners: [[f32; 3]; 3], seen: Fragment) {
-    let count = rows.len() / camera.width;
-    let reach = |k: usize| {
-        let (low, high) = corners.iter().fold((f32::MAX, f32::MIN), |(l, h), c| (l.min(c[k]), h.max(c[k])));
-        (low.floor(), high.ceil() + 1.0)
-    };
-    let ((left, right), (up, down)) = (reach(0), reach(1));
-    if down <= top as f32 || up >= (top + count) as f32 || right <= 0.0 || left >= camera.width as f32 {
-        return;
-    }
-    for y in up.max(top as f32) as usize..(down as usize).min(top + count) {
-        for x in left.max(0.0) as usize..(right as usize).min(camera.width) {
-            let (px, py) = (x as f32 + 0.5, y as f32 + 0.5);
-            let Some(w) = weights(corners, px, py) else { return };
-            if w.iter().any(|&v| v < 0.0) {
-                continue;
-            }
-            let depth = w[0] * corners[0][2] + w[1] * corners[1][2] + w[2] * corners[2][2];
-            let place = camera.plane(px, py, depth);
-            let inside = (0..2).all(|i| place[i] >= clip.low[i] && place[i] <= clip.high[i]);
-            let slot = &mut rows[(y - top) * camera.width + x];
-            if inside && depth > slot.depth {
-                *slot = Fragment { depth, ..seen };
-            }
-        }
-    }
 }
 
 /// A visible point of a surface.
@@ -147,7 +240,7 @@ struct Surface {
 
 impl Surface {
     fn at(quad: &Quad, shift: [f32; 3], second: bool, camera: &Camera, [x, y]: [usize; 2]) -> Self {
-        let corners = triangle(second);
+        let corners = halves(second);
         let screen = corners.map(|i| camera.project(add(quad.corners[i], shift)));
         let w = weights(screen, x as f32 + 0.5, y as f32 + 0.5).unwrap_or([1.0, 0.0, 0.0]);
         let blend = |values: &[[f32; 3]; 4]| {
@@ -169,7 +262,7 @@ impl Surface {
     }
 
     /// Colour under the lights: `sky` and `sun` are the shares of them that arrive; `calm` subdues patterns.
-    fn lit(&self, camera: &Camera, sky: f32, sun: f32, calm: bool) -> Rgb {
+    fn lit(&self, camera: &Camera, [sky, sun]: [f32; 2], calm: bool) -> Rgb {
         let [right, up, toward] = camera.axes;
         let key = unit(add(add(scale(right, KEY[0]), scale(up, KEY[1])), scale(toward, KEY[2])));
         if self.cut {
@@ -215,12 +308,18 @@ fn twist([around, along, turns]: [f32; 3]) -> f32 {
 /// Smooth noise, 0 to 1, that repeats in y after a whole number of cells.
 fn noise(x: f32, y: f32, cells: i32) -> f32 {
     let smooth = |t: f32| t * t * (3.0 - 2.0 * t);
-    let (i, j) = (x.floor(), y.floor());
-    let (u, v) = (smooth(x - i), smooth(y - j));
-    let (i, j) = (i as i32, j as i32);
+    let [(i, u), (j, v)] = [x, y].map(whole);
+    let (u, v) = (smooth(u), smooth(v));
     let value = |i: i32, j: i32| chance(i, j.rem_euclid(cells)) as f32 / u32::MAX as f32;
     let row = |j: i32| value(i, j) + u * (value(i + 1, j) - value(i, j));
     row(j) + v * (row(j + 1) - row(j))
+}
+
+/// The greatest whole number below, and what is left.
+fn whole(value: f32) -> (i32, f32) {
+    let cut = value as i32;
+    let below = if (cut as f32) > value { cut - 1 } else { cut };
+    (below, value - below as f32)
 }
 
 /// Bits without pattern for a pair of numbers.
@@ -231,56 +330,74 @@ fn chance(i: i32, j: i32) -> u32 {
     h ^ (h >> 15)
 }
 
-/// Unit vectors in [`TURNS`] directions.
-static COMPASS: LazyLock<[[f32; 2]; TURNS]> = LazyLock::new(|| {
-    std::array::from_fn(|i| {
-        let (s, c) = (std::f32::consts::TAU * i as f32 / TURNS as f32).sin_cos();
-        [c, s]
-    })
-});
-const TURNS: usize = 64;
+/// How high the surface stands toward the viewer at every pixel, mm, and where light is looked for around it.
+struct Heights {
+    /// With a margin on every side; `NEG_INFINITY` where there is no surface.
+    values: Vec<f32>,
+    width: usize,
+    margin: usize,
+    /// For each way that a pixel can be turned: in every direction, how far away, mm, and how far in `values`.
+    around: [[[(f32, isize); RINGS.len()]; DIRECTIONS]; TURNS],
+    /// For each way: along the ray to the key light, by how much it rises, mm, and how far in `values`.
+    towards: [[(f32, isize); STEPS]; TURNS],
+}
 
-/// Share of the sky that is seen from a pixel: less where surfaces nearby are higher.
-fn openness(buffer: &[Fragment], camera: &Camera, x: usize, y: usize) -> f32 {
-    const DIRECTIONS: usize = 8;
-    const RADII: [f32; 3] = [0.07, 0.18, 0.42];
-    let own = buffer[y * camera.width + x].depth;
-    // Turned from pixel to pixel, so that the few directions do not show.
-    let start = chance(x as i32, y as i32) as usize % (TURNS / DIRECTIONS);
-    let mut hidden = 0.0;
-    for [c, s] in COMPASS.iter().skip(start).step_by(TURNS / DIRECTIONS) {
-        let steepest = RADII.iter().fold(0.0_f32, |steepest, radius| {
-            let rise =
-                depth(buffer, camera, x as f32 + c * radius * camera.scale, y as f32 + s * radius * camera.scale) - own;
-            steepest.max((rise - 0.01) / radius)
+/// Where a pixel looks for the sky: in so many directions, so far away, mm.
+const DIRECTIONS: usize = 8;
+const RINGS: [f32; 3] = [0.07, 0.18, 0.42];
+/// Where it looks for the key light: at so many places, up to so far away, mm.
+const STEPS: usize = 14;
+const LENGTH: f32 = 0.9;
+/// Ways to turn and shift these places from pixel to pixel, so that they do not show.
+const TURNS: usize = 16;
+
+impl Heights {
+    fn of(buffer: &[Fragment], camera: &Camera) -> Self {
+        let margin = (LENGTH * camera.scale) as usize + 2;
+        let width = camera.width + 2 * margin;
+        let mut values = vec![f32::NEG_INFINITY; width * (camera.height + 2 * margin)];
+        let rows = values.par_chunks_mut(width).skip(margin).zip(buffer.par_chunks(camera.width * FINER * FINER));
+        rows.for_each(|(row, samples)| {
+            let firsts = samples.iter().step_by(FINER).take(camera.width);
+            row[margin..].iter_mut().zip(firsts).for_each(|(height, seen)| *height = seen.depth);
         });
-        hidden += steepest.min(1.6) / (1.0 + steepest.min(1.6));
+        let place = |[right, down]: [f32; 2]| {
+            let [right, down] = [right, down].map(|way| (way * camera.scale).round() as isize);
+            down * width as isize + right
+        };
+        let around = std::array::from_fn(|turn| {
+            std::array::from_fn(|direction| {
+                let angle = std::f32::consts::TAU * (direction as f32 + turn as f32 / TURNS as f32) / DIRECTIONS as f32;
+                RINGS.map(|ring| (ring, place([ring * angle.cos(), ring * angle.sin()])))
+            })
+        });
+        let flat = KEY[0].hypot(KEY[1]);
+        let towards = std::array::from_fn(|turn| {
+            std::array::from_fn(|k| {
+                let run = LENGTH * (k as f32 + 0.3 + 0.7 * turn as f32 / TURNS as f32) / STEPS as f32;
+                (run * KEY[2] / flat, place([KEY[0] / flat * run, -KEY[1] / flat * run]))
+            })
+        });
+        Self { values, width, margin, around, towards }
     }
-    1.0 - 1.25 * hidden / DIRECTIONS as f32
-}
 
-/// Share of the key light that reaches a pixel.
-fn sunlit(buffer: &[Fragment], camera: &Camera, x: usize, y: usize) -> f32 {
-    const STEPS: usize = 14;
-    const LENGTH: f32 = 0.9;
-    let own = buffer[y * camera.width + x].depth;
-    let flat = KEY[0].hypot(KEY[1]);
-    let jitter = chance(y as i32, x as i32) as f32 / u32::MAX as f32;
-    let mut blocked = 0.0_f32;
-    for k in 0..STEPS {
-        let run = LENGTH * (k as f32 + 0.3 + 0.7 * jitter) / STEPS as f32;
-        let (dx, dy) = (KEY[0] / flat * run * camera.scale, -KEY[1] / flat * run * camera.scale);
-        let over = depth(buffer, camera, x as f32 + dx, y as f32 + dy) - (own + run * KEY[2] / flat);
-        blocked = blocked.max(((over - 0.01) / 0.05).clamp(0.0, 1.0));
+    /// Shares of the sky that is seen from a height at a pixel, less where surfaces nearby are higher, and of the key light that
+    /// reaches it.
+    fn light(&self, x: usize, y: usize, own: f32) -> [f32; 2] {
+        let here = (y + self.margin) * self.width + x + self.margin;
+        let height = |away: isize| self.values[here.wrapping_add_signed(away)];
+        let turn = chance(x as i32, y as i32) as usize % TURNS;
+        let mut hidden = 0.0;
+        for direction in &self.around[turn] {
+            let rise = |&(ring, away): &(f32, isize)| (height(away) - own - 0.01) / ring;
+            let steepest = direction.iter().map(rise).fold(0.0, f32::max).min(1.6);
+            hidden += steepest / (1.0 + steepest);
+        }
+        let over = |&(rise, away): &(f32, isize)| height(away) - own - rise;
+        let blocked = self.towards[turn].iter().map(over).fold(f32::NEG_INFINITY, f32::max);
+        let blocked = ((blocked - 0.01) / 0.05).clamp(0.0, 1.0);
+        [1.0 - 1.25 * hidden / DIRECTIONS as f32, 1.0 - 0.75 * blocked]
     }
-    1.0 - 0.75 * blocked
-}
-
-fn depth(buffer: &[Fragment], camera: &Camera, x: f32, y: f32) -> f32 {
-    if x < 0.0 || y < 0.0 || x >= camera.width as f32 || y >= camera.height as f32 {
-        return f32::NEG_INFINITY;
-    }
-    buffer[y as usize * camera.width + x as usize].depth
 }
 
 #[cfg(test)]

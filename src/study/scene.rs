@@ -25,7 +25,7 @@ pub struct Observed {
     /// Smallest step, and smallest estimated limit without factors, s.
     pub dt: f64,
     pub dt_limit: f64,
-    /// Largest error of the energy balance, without its sign, over the largest energy.
+    /// Largest error of the energy balance, without its sign, over the largest energy, before a guard stops the scene.
     pub balance: f64,
     /// Largest penetration of any kind, mm.
     pub penetration: f64,
@@ -104,7 +104,8 @@ fn observe(mut simulation: Simulation, longest: u64) -> Result<Observed> {
             Err(Error::Guard(guard)) => match retries.go_back(&mut simulation, guard) {
                 Ok(earlier) => way = earlier,
                 Err(error) => {
-                    way.look(&simulation);
+                    // the state that a guard stops is not one of the results, whose balance is judged
+                    way.seen.look(&simulation);
                     way.seen.stop(error)?;
                     break;
                 }
