@@ -74,7 +74,7 @@ pub struct Health {
     /// Estimated limit of the time step without factors, s, and its node.
     pub dt_limit: f64,
     pub limiting_node: usize,
-    /// Mass added now by contact, as a share of the true mass of solids and of threads.
+    /// Mass added now by the floor and by contact, as a share of the true mass of solids and of threads.
     pub added_mass: [f64; 2],
 }
 
@@ -573,9 +573,14 @@ impl Simulation {
         self.diagnosed = self.step;
         self.health.touching = status::TOUCHING.map(|p| status[p] / steps);
         let first = self.model.first_thread;
-        let (solids, threads) = self.model.true_mass.split_at(first);
-        self.health.added_mass = [(places.added[0], solids), (places.added[1], threads)]
-            .map(|(added, mass)| added.map_or(0.0, |added| added.of(&totals, 0) / mass.iter().sum::<f64>()));
+        let nodes = self.model.mass.len();
+        self.health.added_mass =
+            [(places.added[0], 0..first), (places.added[1], first..nodes)].map(|(added, range)| {
+                let [mass, truly] =
+                    [&self.model.mass, &self.model.true_mass].map(|m| m[range.clone()].iter().sum::<f64>());
+                let by_contact = added.map_or(0.0, |added| added.of(&totals, 0));
+                if truly > 0.0 { (mass - truly + by_contact) / truly } else { 0.0 }
+            });
         let mut cleared = status;
         for place in [status::CONTACT_RATE].into_iter().chain(status::PENETRATION).chain(status::TOUCHING) {
             cleared[place] = 0;

@@ -103,10 +103,10 @@ fn parameters(file: &str) -> Vec<Field<&'static str>> {
             contact::Params: period, cells, capacity, faces, slots, beam_slots, slabs, state, origin, cell, skin, friction, tangential, damping,
             force_quantum, stiffness_quantum, thread_radius, thread_thread, self_arc, depth, apart
         ),
-        "conditions/prescribed" => fields!(conditions::prescribed::Params: first_thread, gravity),
+        "conditions/prescribed" => fields!(conditions::prescribed::Params: first_thread),
         "dynamics/assemble" => fields!(
             dynamics::assemble::Params: first_thread, force_quantum, stiffness_quantum, mass_factor, mass_memory,
-            mass_per_stiffness
+            mass_per_stiffness, gravity
         ),
         "dynamics/fibre_lines" => fields!(dynamics::fibre_lines::Params: beta),
         "dynamics/integrate" => fields!(dynamics::integrate::Params: first_thread, gravity),

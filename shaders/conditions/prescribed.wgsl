@@ -10,9 +10,6 @@
 #if prescribed
 struct Params {
     first_thread: u32,
-    gravity_x: f32,
-    gravity_y: f32,
-    gravity_z: f32,
 }
 
 @group(2) @binding(1) var<uniform> params: Params;
@@ -30,9 +27,6 @@ fn prescribed(item: u32) {
     let node = nodes[2u * item];
     let mask = nodes[2u * item + 1u];
     let plane = arrayLength(&mass);
-#if GRAVITY
-    let gravity = vec3<f32>(params.gravity_x, params.gravity_y, params.gravity_z);
-#endif
 #if DAMPING
     let damping = select(row.damping_thread, row.damping_solid, node < params.first_thread);
     let keep_gain = factors(damping, row.dt_mid);
@@ -47,10 +41,7 @@ fn prescribed(item: u32) {
         let v = velocity[place];
         let force = acceleration[place] / inverse_mass[node];
         let aim = targets[3u * item + k] * row.motion;
-        var a = (aim - v * keep_gain.x) / keep_gain.y;
-#if GRAVITY
-        a = a - gravity[k];
-#endif
+        let a = (aim - v * keep_gain.x) / keep_gain.y;
         acceleration[place] = a;
         let mean = (v + aim) * 0.5;
         // a node that is held altogether carries no added mass

@@ -1,4 +1,4 @@
-// Accelerations: each node gathers its corner slots in a fixed order, adds contact, and divides by its mass.
+// Accelerations: each node gathers its corner slots in a fixed order, adds contact and its weight, and divides by its mass.
 
 #include "kernel/row"
 #include "elements/mod"
@@ -30,6 +30,9 @@ struct Params {
     mass_factor: f32,
     mass_memory: f32,
     mass_per_stiffness: f32,
+    gravity_x: f32,
+    gravity_y: f32,
+    gravity_z: f32,
 }
 
 @group(2) @binding(1) var<uniform> params: Params;
@@ -48,9 +51,15 @@ const READS: u32 = 5u;
 #endif
 #if MASS_ADDED
 @group(1) @binding(READS) var<storage, read> element_stiffness: array<f32>;
-const WRITES: u32 = READS + 1u;
+const WEIGHED: u32 = READS + 1u;
 #else
-const WRITES: u32 = READS;
+const WEIGHED: u32 = READS;
+#endif
+#if GRAVITY
+@group(1) @binding(WEIGHED) var<storage, read> true_mass: array<f32>;
+const WRITES: u32 = WEIGHED + 1u;
+#else
+const WRITES: u32 = WEIGHED;
 #endif
 @group(1) @binding(WRITES) var<storage, read_write> acceleration: array<f32>;
 @group(1) @binding(WRITES + 1u) var<storage, read_write> inverse_mass: array<f32>;
@@ -123,9 +132,14 @@ fn assemble(node: u32) {
         }
 #endif
     }
-    var acting = mass[node];
 #if CONTACT
     force = force + vec3<f32>(taken(node), taken(node + plane), taken(node + 2u * plane));
+#endif
+#if GRAVITY
+    force = force + true_mass[node] * vec3<f32>(params.gravity_x, params.gravity_y, params.gravity_z);
+#endif
+    var acting = mass[node];
+#if CONTACT
     let contact = f32(contact_stiffness[node]) * params.stiffness_quantum;
     contact_stiffness[node] = 0;
 #if MASS_ADDED

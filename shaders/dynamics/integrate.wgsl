@@ -36,9 +36,15 @@ const READS: u32 = ACTING;
 #endif
 #if LINES
 @group(1) @binding(READS) var<storage, read> correction: array<f32>;
-const WRITES: u32 = READS + 1u;
+const WEIGHED: u32 = READS + 1u;
 #else
-const WRITES: u32 = READS;
+const WEIGHED: u32 = READS;
+#endif
+#if GRAVITY
+@group(1) @binding(WEIGHED) var<storage, read> true_mass: array<f32>;
+const WRITES: u32 = WEIGHED + 1u;
+#else
+const WRITES: u32 = WEIGHED;
 #endif
 @group(1) @binding(WRITES) var<storage, read_write> velocity: array<f32>;
 @group(1) @binding(WRITES + 1u) var<storage, read_write> quanta: array<i32>;
@@ -67,7 +73,7 @@ fn integrate(node: u32) {
 #endif
 #if WORKS
     let own_mass = mass[node];
-    // what acts beyond the true mass
+    // what acts beyond the mass of the node
     var extra = 0.0;
 #endif
 #if MASS_ADDED
@@ -93,9 +99,6 @@ fn integrate(node: u32) {
         a = a + c;
         virtual_force = (own_mass + extra) * c;
 #endif
-#if GRAVITY
-        a = a + gravity[k];
-#endif
 #if MASS_ADDED
         virtual_force = virtual_force - extra * a;
 #endif
@@ -116,7 +119,7 @@ fn integrate(node: u32) {
         inertia = inertia + virtual_force * mean * row.dt_mid;
 #endif
 #if GRAVITY
-        fallen = fallen + (own_mass + extra) * gravity[k] * mean * row.dt_mid;
+        fallen = fallen + true_mass[node] * gravity[k] * mean * row.dt_mid;
 #endif
         var r = remainder[at] + new_v * row.dt;
         quanta[at] = carry(quanta[at], &r);

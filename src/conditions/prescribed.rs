@@ -13,8 +13,6 @@ use std::ops::Range;
 pub struct Params {
     /// First node of a thread.
     pub first_thread: u32,
-    /// Gravity, mm/s², which the integration adds to every node.
-    pub gravity: [f32; 3],
 }
 
 /// Node and mask of components (bit k for component k), 2 numbers a condition.
@@ -27,23 +25,21 @@ const ACCELERATION: usize = 4;
 const INVERSE_MASS: usize = 5;
 /// Work of the reaction, mJ.
 const WORK: usize = 6;
-/// Force that the scene exerts on the prescribed components, N (3).
+/// Force that the scene exerts on the prescribed components, N (3), weight included.
 const REACTION: usize = 7;
 
-/// Replaces accelerations of prescribed components, before fibre lines see them; `GRAVITY` and `DAMPING` as for the integration.
-pub struct Prescribed<const GRAVITY: bool, const DAMPING: bool>;
+/// Replaces accelerations of prescribed components, before fibre lines see them; `DAMPING` as for the integration.
+pub struct Prescribed<const DAMPING: bool>;
 /// Takes back what fibre lines did to prescribed components.
 pub struct Hold;
 
-impl<const GRAVITY: bool, const DAMPING: bool> Kernel for Prescribed<GRAVITY, DAMPING> {
-    const SHADER: Shader = Shader {
-        defines: &[when(GRAVITY, "GRAVITY"), when(DAMPING, "DAMPING")],
-        ..Shader::new("conditions/prescribed", "prescribed")
-    };
+impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
+    const SHADER: Shader =
+        Shader { defines: &[when(DAMPING, "DAMPING")], ..Shader::new("conditions/prescribed", "prescribed") };
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let Params { first_thread, gravity } = io.params();
+        let Params { first_thread } = io.params();
         let (nodes, targets, velocity, mass) =
             (io.uints(NODES), io.scalars(TARGETS), io.scalars(VELOCITY), io.scalars(MASS));
         let plane = mass.len();
@@ -64,10 +60,7 @@ impl<const GRAVITY: bool, const DAMPING: bool> Kernel for Prescribed<GRAVITY, DA
                 let (place, v) = (node + k * plane, velocity[node + k * plane]);
                 let force = acceleration.get(place) / inverse.get(node);
                 let target = targets[3 * item + k] * row.motion;
-                let mut a = (target - v * keep) / gain;
-                if GRAVITY {
-                    a = a - L::Scalar::from_f64(f64::from(gravity[k]));
-                }
+                let a = (target - v * keep) / gain;
                 acceleration.set(place, a);
                 let mean = (v + target) * L::Scalar::from_f64(0.5);
                 // a node that is held altogether carries no added mass

@@ -1,4 +1,7 @@
-//! Accelerations: each node gathers its corner slots in a fixed order, adds contact, and divides by its mass.
+//! Accelerations: each node gathers its corner slots in a fixed order, adds contact and its weight, and divides by its mass.
+//!
+//! Gravity pulls on the true mass alone, not on what the mass floor, a least limit or contact adds: a body at rest presses with its
+//! weight.
 //!
 //! With contact-aware mass, a node in contact is as heavy as a stable step needs, m ≥ dt²/4 · K, with K the row sum of the
 //! stiffness of contact and of elements at the node; what was added fades once contact is lost. A least limit of the step does the
@@ -38,6 +41,8 @@ pub struct Params {
     pub mass_memory: f32,
     /// Least mass for the stiffness of elements, s²: a quarter of the square of the least limit of the time step.
     pub mass_per_stiffness: f32,
+    /// Gravity, mm/s².
+    pub gravity: [f32; 3],
 }
 
 pub const SOLID_SLOTS: usize = 0;
@@ -50,26 +55,34 @@ pub const BEND_SLOTS: usize = 5;
 pub const BEND_FORCE: usize = 6;
 /// Row sums of element stiffness, N/mm; only with `MASS_ADDED`.
 pub const ELEMENT_STIFFNESS: usize = 7;
-/// The first write: acceleration, mm/s² (3 planes); without `MASS_ADDED`, all writes are one number earlier.
-const ACCELERATION: usize = 8;
+/// True mass, tonne; only with `GRAVITY`; without what is missing before it, it and all that follows are earlier.
+pub const TRUE_MASS: usize = 8;
+/// The first write: acceleration, mm/s² (3 planes).
+const ACCELERATION: usize = 9;
 /// Inverse of the mass that acts, 1/tonne.
-const INVERSE_MASS: usize = 9;
+const INVERSE_MASS: usize = 10;
 /// Contact force in quanta (3 planes), set back to zero.
-const CONTACT_FORCE: usize = 10;
+const CONTACT_FORCE: usize = 11;
 /// Contact stiffness in quanta, set back to zero.
-const CONTACT_STIFFNESS: usize = 11;
+const CONTACT_STIFFNESS: usize = 12;
 /// Added mass, tonne; without `MASS_ADDED`, the status.
-const ADDED_MASS: usize = 12;
-const STATUS: usize = 12;
+const ADDED_MASS: usize = 13;
+const STATUS: usize = 13;
 
-/// Assembly; with `CONTACT` contact forces, with `MASS_ADDED` contact-aware mass, with `BENDING` bends of threads.
-pub struct Assemble<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool>;
+/// Assembly; with `CONTACT` contact forces, with `MASS_ADDED` contact-aware mass, with `BENDING` bends of threads, with `GRAVITY`
+/// weight.
+pub struct Assemble<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRAVITY: bool>;
 
-impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool> Kernel
-    for Assemble<CONTACT, MASS_ADDED, BENDING>
+impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRAVITY: bool> Kernel
+    for Assemble<CONTACT, MASS_ADDED, BENDING, GRAVITY>
 {
     const SHADER: Shader = Shader {
-        defines: &[when(CONTACT, "CONTACT"), when(MASS_ADDED, "MASS_ADDED"), when(BENDING, "BENDING")],
+        defines: &[
+            when(CONTACT, "CONTACT"),
+            when(MASS_ADDED, "MASS_ADDED"),
+            when(BENDING, "BENDING"),
+            when(GRAVITY, "GRAVITY"),
+        ],
         ..Shader::new("dynamics/assemble", "assemble")
     };
 
@@ -82,13 +95,15 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool> Kernel
         let bends = BENDING.then(|| (io.uints(BEND_SLOTS), io.scalars(BEND_FORCE)));
         let masses = io.scalars(MASS);
         let unbent = 2 * usize::from(!BENDING);
-        let missing = unbent + usize::from(!MASS_ADDED);
+        let unweighed = unbent + usize::from(!MASS_ADDED);
+        let true_masses = if GRAVITY { io.scalars(TRUE_MASS - unweighed) } else { &[] };
+        let missing = unweighed + usize::from(!GRAVITY);
         let mut acceleration = io.own::<L::Scalar>(ACCELERATION - missing);
         let mut inverse = io.own::<L::Scalar>(INVERSE_MASS - missing);
         let mut contact_force = CONTACT.then(|| io.own::<i32>(CONTACT_FORCE - missing));
         let mut contact_stiffness = CONTACT.then(|| io.own::<i32>(CONTACT_STIFFNESS - missing));
         let elements = if MASS_ADDED { io.scalars(ELEMENT_STIFFNESS - unbent) } else { &[] };
-        let mut added = MASS_ADDED.then(|| io.own::<L::Scalar>(ADDED_MASS - unbent));
+        let mut added = MASS_ADDED.then(|| io.own::<L::Scalar>(ADDED_MASS - missing));
         let zero = L::Scalar::from_f64(0.0);
         let real = |x: f32| L::Scalar::from_f64(f64::from(x));
         let reach = real(params.mass_factor * 0.25) * io.row.dt * io.row.dt;
@@ -129,6 +144,11 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool> Kernel
                         *force = *force + L::Scalar::from_i32(*quanta) * real(params.force_quantum);
                         *quanta = 0;
                     }
+                }
+            }
+            if GRAVITY {
+                for (force, gravity) in force.iter_mut().zip(params.gravity) {
+                    *force = *force + true_masses[node] * real(gravity);
                 }
             }
             let mut mass = masses[node];

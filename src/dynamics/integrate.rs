@@ -28,12 +28,14 @@ pub const MASS: usize = 1;
 pub const INVERSE_MASS: usize = 2;
 /// Only with `LINES`; without it, what follows is one number earlier.
 pub const CORRECTION: usize = 3;
+/// Only with `GRAVITY`; without it, what follows is one number earlier.
+pub const TRUE_MASS: usize = 4;
 /// The first write: velocity, mm/s (3 planes).
-const VELOCITY: usize = 4;
-const QUANTA: usize = 5;
-const REMAINDER: usize = 6;
+const VELOCITY: usize = 5;
+const QUANTA: usize = 6;
+const REMAINDER: usize = 7;
 /// Works, mJ, a plane each, see [`Works`].
-const WORK: usize = 7;
+const WORK: usize = 8;
 
 /// What changes the energy of nodes as they are integrated. Each has a plane in the work buffer, in this order.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -61,8 +63,8 @@ impl Works {
     }
 }
 
-/// Integration; with `LINES`, the correction of fibre lines is added first, with `GRAVITY` gravity; with `MASS_ADDED` the mass
-/// that acts may be more than the true one.
+/// Integration; with `LINES`, the correction of fibre lines is added first; with `GRAVITY` the work of weight is kept; with
+/// `MASS_ADDED` the mass that acts may be more than that of the node.
 pub struct Integrate<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADDED: bool>;
 
 /// Factors on the old velocity and on the acceleration.
@@ -103,7 +105,9 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
         let unchanged = massless + usize::from(!MASS_ADDED);
         let inverse = if MASS_ADDED { io.scalars(INVERSE_MASS - massless) } else { &[] };
         let correction = if LINES { io.scalars(CORRECTION - unchanged) } else { &[] };
-        let missing = unchanged + usize::from(!LINES);
+        let straight = unchanged + usize::from(!LINES);
+        let true_masses = if GRAVITY { io.scalars(TRUE_MASS - straight) } else { &[] };
+        let missing = straight + usize::from(!GRAVITY);
         let mut velocity = io.own::<L::Scalar>(VELOCITY - missing);
         let mut quanta = io.own::<i32>(QUANTA - missing);
         let mut remainder = io.own::<L::Scalar>(REMAINDER - missing);
@@ -117,7 +121,7 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
             let (keep, gain) = if is_solid { solid } else { thread };
             let damping = if is_solid { row.damping_solid } else { row.damping_thread };
             let mass = if works.count() > 0 { masses[node] } else { zero };
-            // what acts beyond the true mass
+            // what acts beyond the mass of the node
             let added = MASS_ADDED && inverse[node] != zero;
             let extra = if added { L::Scalar::from_f64(1.0) / inverse[node] - mass } else { zero };
             let (mut damped, mut inertia, mut fallen) = (zero, zero, zero);
@@ -128,9 +132,6 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
                     let c = correction[node + k * plane];
                     a = a + c;
                     virtual_force = (mass + extra) * c;
-                }
-                if GRAVITY {
-                    a = a + L::Scalar::from_f64(f64::from(params.gravity[k]));
                 }
                 if MASS_ADDED {
                     virtual_force = virtual_force - extra * a;
@@ -146,8 +147,8 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
                     inertia = inertia + virtual_force * mean * row.dt_mid;
                 }
                 if GRAVITY {
-                    fallen =
-                        fallen + (mass + extra) * L::Scalar::from_f64(f64::from(params.gravity[k])) * mean * row.dt_mid;
+                    let gravity = L::Scalar::from_f64(f64::from(params.gravity[k]));
+                    fallen = fallen + true_masses[node] * gravity * mean * row.dt_mid;
                 }
                 let (q, r) = (quanta.at(k, node), remainder.at(k, node));
                 (*q, *r) = carry(*q, *r + new * row.dt);

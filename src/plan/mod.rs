@@ -263,6 +263,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let mass = b.table("mass", floored.clone());
     let status_ = b.add("status", Kind::Uint, status::SIZE, false, Initial::Zero);
     let acceleration = b.scratch("acceleration", 3 * nodes);
+    let weighed = active.gravity.then(|| b.table("true mass", true_mass.clone()));
     let inverse_mass = b.scratch("inverse mass", nodes);
     let works = active.works();
     let work = (works.count() > 0).then(|| b.scratch("work on nodes", works.count() * nodes));
@@ -356,8 +357,10 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let solid_slots = b.indices("corner slots of solid nodes", solids.slots.clone());
     let thread_slots = b.indices("slots of thread nodes", threads.slots.clone());
     let contact_mass = effects.contact_mass.as_ref().filter(|_| active.contact_mass);
+    let gravity = effects.gravity_mm_s2.unwrap_or_default().map(|g| g as f32);
     let assemble_params = assemble::Params {
         first_thread,
+        gravity,
         force_quantum: contact.as_ref().map_or(1.0, |c| c.params.force_quantum),
         stiffness_quantum: contact.as_ref().map_or(1.0, |c| c.params.stiffness_quantum),
         mass_factor: contact_mass.map_or(0.0, |c| c.factor as f32),
@@ -367,18 +370,18 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let mut reads = vec![solid_slots, hex.force, thread_slots, beam_force, mass];
     reads.extend(bent.iter().flat_map(|bent| [bent.slots, bent.force]));
     reads.extend(contact_mass.map(|_| element_limit));
+    reads.extend(weighed);
     let mut writes = vec![(acceleration, own(3, 1)), (inverse_mass, own(1, 1))];
     let added_mass = contact_mass.map(|_| b.add("added mass", Kind::Scalar, nodes, true, Initial::Zero));
     if let Some(contact) = &contact {
         writes.extend([(contact.force, own(3, 1)), (contact.stiffness, own(1, 1))]);
         writes.push(added_mass.map_or((status_, Access::Atomic), |added| (added, own(1, 1))));
     }
-    let kernel = flagged!(Assemble; contact.is_some(), active.contact_mass, active.bending);
+    let kernel = flagged!(Assemble; contact.is_some(), active.contact_mass, active.bending, active.gravity);
     b.plan.step.push(waiting(coded(kernel, "assemble", nodes, NODE_GRAIN, &reads, &writes, assemble_params)));
     let forces = b.plan.step.len();
 
     // conditions
-    let gravity = effects.gravity_mm_s2.unwrap_or_default().map(|g| g as f32);
     let (mut reaction, mut reaction_work, mut condition_nodes) = (None, None, None);
     if conditions.count() > 0 {
         let count = conditions.count();
@@ -389,8 +392,8 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         let reads = [at, targets, velocity, mass];
         let writes =
             [(acceleration, Access::Scatter), (inverse_mass, Access::Scatter), (done, own(1, 1)), (force, own(1, 3))];
-        let params = prescribed::Params { first_thread, gravity };
-        let kernel = flagged!(Prescribed; active.gravity, active.damping);
+        let params = prescribed::Params { first_thread };
+        let kernel = flagged!(Prescribed; active.damping);
         b.plan.step.push(waiting(coded(kernel, "prescribed", count, NODE_GRAIN, &reads, &writes, params)));
     }
 
@@ -424,6 +427,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     reads.extend(work.map(|_| mass));
     reads.extend(added_mass.map(|_| inverse_mass));
     reads.extend(correction);
+    reads.extend(weighed);
     let mut writes = vec![(velocity, own(3, 1)), (quanta_, own(3, 1)), (remainder, own(3, 1))];
     writes.extend(work.map(|work| (work, own(works.count(), 1))));
     let kernel = flagged!(Integrate; active.fibre_lines, active.gravity, active.damping, active.contact_mass);
