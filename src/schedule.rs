@@ -71,7 +71,7 @@ impl Schedule {
                 Step::Settle { .. } | Step::Hold { .. } => load,
                 Step::Pretension { .. } => Load { thermal: 1.0, radius: 1.0, ..load },
                 Step::Shear { angle_deg, .. } => Load { angle: angle_deg.to_radians(), ..load },
-                Step::Move { .. } => Load { motion: 1.0, ..load },
+                Step::Move { to, .. } => Load { motion: to, ..load },
             };
             let end = start + step.time();
             let damping = effects.damping.as_ref().map_or([0.0; 2], |d| match step {
@@ -148,7 +148,7 @@ mod tests {
     fn every_load_step_has_its_damping() {
         let damping = Damping { rate_per_s: 3.0, thread_settle_rate_per_s: 5.0, move_rate_per_s: Some(2.0) };
         let effects = Effects { damping: Some(damping), ..Effects::default() };
-        let steps = [Step::Pretension { time_s: 1.0 }, Step::Hold { time_s: 1.0 }, Step::Move { time_s: 1.0 }];
+        let steps = [Step::Pretension { time_s: 1.0 }, Step::Hold { time_s: 1.0 }, Step::Move { to: 1.0, time_s: 1.0 }];
         let schedule = Schedule::new(&steps, &effects);
         let rates = |time: f64| {
             let row = schedule.row(time, 1e-3, 1e-3);
@@ -173,5 +173,13 @@ mod tests {
         for t in [0.5, 3.1, 3.4, 5.0, 6.7] {
             assert!((speed(t + 1e-4) - speed(t)).abs() < 1e-3, "a kink at {t}");
         }
+    }
+
+    #[test]
+    fn every_move_goes_on_from_where_the_last_one_ended() {
+        let to = |to: f64| Step::Move { to, time_s: 1.0 };
+        let schedule = Schedule::new(&[to(0.5), to(-0.25), to(1.0)], &Effects::default());
+        assert_eq!([0.0, 1.0, 2.0, 3.0].map(|t| schedule.load(t).motion), [0.0, 0.5, -0.25, 1.0]);
+        assert_eq!(schedule.load(1.5).motion, 0.125);
     }
 }

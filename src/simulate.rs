@@ -336,6 +336,7 @@ impl Simulation {
         self.dt_before = self.dt;
         self.set_state(&totals, &totals);
         self.energies.contact = self.contact_at_rest()?;
+        self.guard_overlap()?;
         self.start_energy = self.energies.output();
         Ok(())
     }

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{advance, bare, below, near, norm, start, with};
+use common::{advance, bare, below, near, norm, positions, start, with};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use tricot::case::steps::Precision::{self, F32, F64};
@@ -230,6 +230,46 @@ fn a_shrinking_thread_is_free_or_pulls() {
             0.5 * AXIAL * 0.0225 * 2.0,
             1e-5,
         );
+    }
+}
+
+/// A thread that ends where it starts is a ring: it moves and shrinks without force, with and without fibre lines.
+#[test]
+fn a_ring_moves_and_shrinks_freely() {
+    const BEAMS: usize = 24;
+    let mut body = circle(BEAMS, 1.0, 1.0);
+    let first = body["nodes"][0].clone();
+    body["nodes"].as_array_mut().unwrap().push(first);
+    body["thermal_strain"] = json!(-0.05);
+    body["velocity_mm_s"] = json!([0, 0, 100]);
+    for lines in [json!({}), Value::Null] {
+        let case = with(
+            scene(body.clone(), json!([])),
+            &[
+                ("/effects/damping", json!({ "rate_per_s": 2000, "thread_settle_rate_per_s": 0 })),
+                ("/effects/fibre_lines", lines.clone()),
+                ("/integration", json!({ "dt_s": 2e-7 })),
+                (
+                    "/steps",
+                    json!([{ "settle": { "time_s": 1e-4 } }, { "pretension": { "time_s": 1e-3 } }, { "hold": { "time_s": 5e-3 } }]),
+                ),
+            ],
+        );
+        let mut simulation = start(&case, F64);
+        assert_eq!([simulation.mesh.nodes.len(), simulation.mesh.beams()], [BEAMS; 2]);
+        advance(&mut simulation, 1e-4);
+        let moved = simulation.fluctuations();
+        let time = simulation.time();
+        let strayed = moved.iter().map(|w| norm([w[0], w[1], w[2] - 100.0 * time])).fold(0.0, f64::max);
+        below("a ring that flies: out of its way, mm", strayed, 1e-12);
+        advance(&mut simulation, 6e-3);
+        let x = positions(&simulation);
+        let middle = [0, 1, 2].map(|k| x.iter().map(|x| x[k]).sum::<f64>() / BEAMS as f64);
+        for x in &x {
+            near("radius of the ring, mm", norm([0, 1, 2].map(|k| x[k] - middle[k])), 0.95, 1e-5);
+        }
+        let tension = simulation.tensions().into_iter().fold(0.0f64, |a, n| a.max(n.abs()));
+        below("tension of the ring, N", tension, 1e-4);
     }
 }
 

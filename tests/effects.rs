@@ -171,7 +171,7 @@ fn a_scene_without_an_effect_has_no_trace_of_it() {
         absent(
             "thermal strain by its step",
             &["thermal"],
-            &free,
+            &cell,
             &[("/steps/0", json!({ "hold": { "time_s": 1e-4 } }))],
         ),
         absent("gravity", &["gravity", "fallen"], &free, &[("/effects/gravity_mm_s2", Value::Null)]),

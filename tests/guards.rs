@@ -112,6 +112,22 @@ fn bodies_that_run_through_each_other() {
 }
 
 #[test]
+fn threads_that_overlap_as_they_are_given() {
+    let thread = |name: &str, ends: [[f64; 3]; 2]| json!({ "name": name, "nodes": ends, "radius_mm": 0.1, "axial_n": 11, "linear_density_tex": 10 });
+    // one goes through the axis of the other, one passes it by less than their radii
+    for height in [0.0, 0.05] {
+        let threads =
+            [thread("a", [[-0.5, 0.0, 0.0], [0.6, 0.0, 0.0]]), thread("b", [[0.0, -0.5, height], [0.0, 0.4, height]])];
+        let case = with(bare(), &[("/domain/mesh/threads", json!(threads)), ("/effects/contact", json!({}))]);
+        let guard = stopped(&mut start(&case, F64), 1.0);
+        assert_eq!((guard.cause.as_str(), guard.step), ("penetration", 0));
+        let depth = format!("{:.4} mm", 0.2 - height);
+        assert!(guard.culprit.contains(&depth) && guard.culprit.contains("beams 0 and 1"), "{guard}");
+        assert!(guard.advice.contains("overlap at the start"), "{guard}");
+    }
+}
+
+#[test]
 fn more_bodies_in_one_place_than_tables_can_hold() {
     let blocks: Vec<Value> = (0..100).map(|i| cube(&format!("cube {i}"), [0.01 * f64::from(i), 0.0, 0.0])).collect();
     let guard = stopped(&mut start(&scene(json!(blocks), json!({}), json!({})), F32), 1e-3);

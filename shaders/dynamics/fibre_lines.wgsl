@@ -68,10 +68,8 @@ fn fibre_lines(number: u32, local: u32) {
     }
     let n = groups[group + 2u];
     let first = groups[group] + lane * n;
-#if PERIODIC
     let closed = groups[group + 3u] == 1u;
     let wrap = vec2<i32>(bitcast<i32>(groups[group + 4u]), bitcast<i32>(groups[group + 5u]));
-#endif
     let last = n - 1u;
 
     for (var i = local; i < n; i += WORKGROUP) {
@@ -80,11 +78,9 @@ fn fibre_lines(number: u32, local: u32) {
         if stiffness[here] > 0.0 && i < last {
             s = segment(here, here + 1u, vec2<i32>());
         }
-#if PERIODIC
         if stiffness[here] > 0.0 && i == last && closed {
             s = segment(here, first, wrap);
         }
-#endif
         stations[i] = vec4<f32>(s.xyz, inverse_mass[here]);
         rows[i].x = s.w;
     }

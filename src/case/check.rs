@@ -43,6 +43,19 @@ fn steps(case: &Case, origin: &Origin) -> Result<()> {
             return Err(origin.error(&format!("steps.{i}"), message));
         }
     }
+    let (mut angle, mut moved) = (0.0, 0.0);
+    for (i, step) in case.steps.iter().enumerate() {
+        let (now, next, what, field) = match step {
+            Step::Shear { angle_deg, .. } => (&mut angle, *angle_deg, "the shear angle", "angle_deg"),
+            Step::Move { to, .. } => (&mut moved, *to, "the share of the displacement", "to"),
+            _ => continue,
+        };
+        if *now == next {
+            let message = format!("{next} is {what} already: give another one, or use hold");
+            return Err(origin.error(&format!("steps.{i}.{field}"), message));
+        }
+        *now = next;
+    }
     let total: f64 = case.steps.iter().map(Step::time).sum();
     let (name, dt) = match case.integration.dt_s {
         Some(dt) => ("dt_s", dt),

@@ -62,7 +62,12 @@ fn explain(error: &serde_json::Error, text: &str) -> String {
     let position = format!(" at line {} column {}", error.line(), error.column());
     let message = message.strip_suffix(&position).unwrap_or(&message);
     let line = text.lines().nth(error.line().saturating_sub(1)).unwrap_or_default();
-    let rest: String = line.chars().skip(error.column().saturating_sub(1)).collect();
+    // columns are bytes; the one of a character of several may be any of them
+    let before = error.column().saturating_sub(1).min(line.len());
+    let rest = &line[(0..=before).rev().find(|at| line.is_char_boundary(*at)).unwrap_or(0)..];
+    if let Some(odd) = rest.chars().next().filter(|c| !c.is_ascii()) {
+        return format!("{message}: {}", name(odd));
+    }
     let hint = if error.is_eof() {
         ": the file ends too early, is it complete?"
     } else if rest.starts_with(['/', '#']) {
@@ -77,6 +82,22 @@ fn explain(error: &serde_json::Error, text: &str) -> String {
         ""
     };
     format!("{message}{hint}")
+}
+
+/// A character that JSON has no place for outside text, and what to do.
+fn name(odd: char) -> String {
+    let code = u32::from(odd);
+    match odd {
+        '\u{a0}' | '\u{202f}' | '\u{2007}' => format!("there is a no-break space (U+{code:04X}), write a plain one"),
+        '\u{feff}' | '\u{200b}'..='\u{200f}' | '\u{2060}' => {
+            format!("there is an invisible character (U+{code:04X}), remove it")
+        }
+        '\u{2018}'..='\u{201f}' | '«' | '»' | '‹' | '›' => {
+            format!("{odd} (U+{code:04X}) is a typographic quotation mark, write \"")
+        }
+        '\u{2010}'..='\u{2015}' | '\u{2212}' => format!("{odd} (U+{code:04X}) is no minus of JSON, write -"),
+        _ => format!("{odd:?} (U+{code:04X}) has no place outside text in quotes"),
+    }
 }
 
 /// A JSON value whose objects hold every name once.
@@ -161,5 +182,31 @@ mod tests {
         assert_eq!(file(&path).unwrap(), json!({}));
         std::fs::File::create(&path).unwrap().set_len(MAX_BYTES + 1).unwrap();
         assert!(file(&path).unwrap_err().to_string().ends_with("larger than 64 MiB, is this a case or a fabric?"));
+    }
+
+    #[test]
+    fn names_characters_that_are_not_of_json() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("case.json");
+        for (text, word) in [
+            ("{ \"é\": 1,\n\u{a0}\"b\": 2 }", "no-break space (U+00A0)"),
+            ("{ \u{201c}a\u{201d}: 1 }", "typographic quotation mark"),
+            ("{ \"é\": \u{2212}1 }", "no minus of JSON"),
+            ("{ \"a\": 1\u{200b} }", "invisible character (U+200B)"),
+            ("{ \"a\": π }", "U+03C0"),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let message = file(&path).unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_read_to_the_last_bit() {
+        // an old example of a number that fast readers miss by one bit
+        for text in ["0.30000000000000004", "1.1125369292536007e-308", "5e-324", "0.1234567890123456789"] {
+            let exact: f64 = text.parse().unwrap();
+            assert_eq!(parse(text).unwrap().as_f64().unwrap().to_bits(), exact.to_bits(), "{text}");
+        }
     }
 }

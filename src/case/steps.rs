@@ -34,12 +34,21 @@ pub enum Step {
         #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,
     },
-    /// The prescribed displacements of a specimen's clamp, or of the conditions of an inline mesh, grow to their full value.
+    /// The prescribed displacements of a specimen's clamp, or of the conditions of an inline mesh, go on to a share of their full
+    /// value.
     Move {
+        /// Share of the full value at the end, −1 to 1. Default 1.
+        #[serde(default = "whole")]
+        #[schemars(range(min = -1, max = 1))]
+        to: f64,
         /// Duration, s.
         #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,
     },
+}
+
+fn whole() -> f64 {
+    1.0
 }
 
 impl Step {
@@ -50,7 +59,7 @@ impl Step {
             | Step::Pretension { time_s }
             | Step::Hold { time_s }
             | Step::Shear { time_s, .. }
-            | Step::Move { time_s } => time_s,
+            | Step::Move { time_s, .. } => time_s,
         }
     }
 
@@ -61,7 +70,7 @@ impl Step {
             | Step::Pretension { time_s }
             | Step::Hold { time_s }
             | Step::Shear { time_s, .. }
-            | Step::Move { time_s } => time_s,
+            | Step::Move { time_s, .. } => time_s,
         }
     }
 
@@ -167,8 +176,9 @@ pub struct Output {
     /// Rows of the tables per load step. Default 200.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub rows_per_step: usize,
-    /// Shear angles at which a frame (VTU) is written, degrees. A frame is also written at the start and at the end of every load step.
-    #[schemars(length(max = 1000), inner(range(min = -80, max = 80)))]
+    /// Shear angles at which a frame (VTU) is written, degrees, whatever their sign: each time that the path comes by. A frame is also
+    /// written at the start and at the end of every load step.
+    #[schemars(length(max = 1000), inner(range(min = 0, max = 80)))]
     pub frames_at_deg: Vec<f64>,
     /// Displacements of a `move` at which a frame is written, mm, in the same way. Default none.
     #[schemars(length(max = 1000), inner(range(min = 0, max = 512)))]

@@ -126,7 +126,12 @@ fn gather<L: Lane, const PERIODIC: bool>(io: &Io<L::Scalar>, group: &Group, scra
         let first = group.first as usize + lane * n;
         for i in 0..n {
             let here = first + i;
-            let (next, shift) = if i + 1 == n { (first, group.shift) } else { (here + 1, [0, 0]) };
+            let (next, shift) = match (i + 1 < n, group.closed == 1) {
+                (true, _) => (here + 1, [0, 0]),
+                (false, true) => (first, group.shift),
+                // an open line has no last segment: any other with a length stands in its place
+                (false, false) => (here - 1, [0, 0]),
+            };
             let shift = if PERIODIC { [shift[0], shift[1], 0] } else { [0; 3] };
             let rest: [L::Scalar; 3] = std::array::from_fn(|k| {
                 let d = reference[next + k * plane].wrapping_sub(reference[here + k * plane]).wrapping_add(shift[k]);

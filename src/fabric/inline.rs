@@ -6,6 +6,9 @@ use crate::error::{Error, Result};
 use crate::mesh::vector::{Vector, norm, sub, unit};
 use crate::mesh::{Block, Mesh, Part, Ply, Thread, quality};
 
+/// Nodes closer than this are the same place, mm.
+const SAME_MM: f64 = 1e-6;
+
 /// Builds the blocks and threads of an inline mesh.
 pub fn build(inline: &InlineMesh) -> Result<Mesh> {
     let mut mesh = Mesh::default();
@@ -97,13 +100,17 @@ fn add_thread(mesh: &mut Mesh, thread: &InlineThread, place: &str) -> Result<()>
             "coincides with the node before it".into()
         })?;
     }
+    // a thread that ends where it starts is a ring
+    let closed = norm(sub(nodes[count - 1], nodes[0])) < SAME_MM;
+    require(!closed || count > 3, &format!("{place}.nodes"), || "closes after two beams, but a ring has three".into())?;
+    let (count, beams) = (count - usize::from(closed), count - 1);
     let first = mesh.nodes.len();
-    mesh.nodes.extend(nodes);
+    mesh.nodes.extend(&nodes[..count]);
     mesh.threads.push(Thread {
         name: thread.name.clone(),
         first,
         count,
-        wrap: None,
+        wrap: closed.then_some([0, 0]),
         radius: thread.radius_mm,
         axial: thread.axial_n,
         bending: thread.bending_n_mm2,
@@ -111,8 +118,8 @@ fn add_thread(mesh: &mut Mesh, thread: &InlineThread, place: &str) -> Result<()>
         linear_density: thread.linear_density_tex * quality::TONNES_PER_MM_OF_TEX,
         thermal_strain: thread.thermal_strain,
         velocity: thread.velocity_mm_s,
-        parts: vec![Part::Free; count - 1],
-        excess: vec![0.0; count - 1],
+        parts: vec![Part::Free; beams],
+        excess: vec![0.0; beams],
     });
     Ok(())
 }

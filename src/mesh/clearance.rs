@@ -155,7 +155,10 @@ pub fn thread_thread(mesh: &Mesh, arc: f64) -> Option<Clearance> {
                 continue;
             }
             if a.thread == b.thread {
-                let middles = (b.arc + f64::from(b.turns) * lengths[b.thread] - a.arc).abs();
+                let ahead = (b.arc + f64::from(b.turns) * lengths[b.thread] - a.arc).abs();
+                // around a ring there are two ways
+                let is_ring = mesh.threads[a.thread].wrap == Some([0, 0]);
+                let middles = if is_ring { ahead.min(lengths[a.thread] - ahead) } else { ahead };
                 if middles - 0.5 * (a.length + b.length) <= arc {
                     continue;
                 }

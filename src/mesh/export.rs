@@ -131,26 +131,34 @@ fn solid_section(block: &Block, set: &str, out: &mut dyn Write) -> io::Result<()
     // Any second direction that is not along the fibre completes the orientation.
     let [d, e, f] = if c.abs() > 0.9 { [1.0, 0.0, 0.0] } else { [-b, a, 0.0] };
     writeln!(out, "** {}: local direction 1 is the fibre", block.name)?;
-    writeln!(out, "*ORIENTATION, NAME=ORIENTATION_{set}\n{a}, {b}, {c}, {d}, {e}, {f}")?;
+    writeln!(out, "*ORIENTATION, NAME=ORIENTATION_{set}\n{}", numbers(&[a, b, c, d, e, f]))?;
     writeln!(out, "*SOLID SECTION, ELSET={set}, MATERIAL=MATERIAL_{set}, ORIENTATION=ORIENTATION_{set}")?;
-    writeln!(out, "*MATERIAL, NAME=MATERIAL_{set}\n*DENSITY\n{:e}", block.density)?;
+    writeln!(out, "*MATERIAL, NAME=MATERIAL_{set}\n*DENSITY\n{}", numbers(&[block.density]))?;
     match &block.material {
         Material::Charmetant { k_elong_mpa, k_comp_mpa, p_comp, k_dist_mpa, k_sh_mpa, .. } => {
             writeln!(out, "** K_elong, K_comp, p_comp, K_dist, K_sh of the hyperelastic law of Charmetant et al.")?;
             writeln!(out, "*USER MATERIAL, CONSTANTS=5")?;
-            writeln!(out, "{k_elong_mpa}, {k_comp_mpa}, {p_comp}, {k_dist_mpa}, {k_sh_mpa}")
+            writeln!(out, "{}", numbers(&[*k_elong_mpa, *k_comp_mpa, *p_comp, *k_dist_mpa, *k_sh_mpa]))
         }
         Material::NeoHookean { young_mpa, poisson } => {
             let shear = young_mpa / (2.0 * (1.0 + poisson));
             let bulk = young_mpa / (3.0 * (1.0 - 2.0 * poisson));
             writeln!(
                 out,
-                "** the same moduli at small strain\n*HYPERELASTIC, NEO HOOKE\n{}, {}",
-                shear / 2.0,
-                2.0 / bulk
+                "** the same moduli at small strain\n*HYPERELASTIC, NEO HOOKE\n{}",
+                numbers(&[shear / 2.0, 2.0 / bulk])
             )
         }
     }
+}
+
+/// Numbers of a line. CalculiX reads no more than twenty characters of each.
+fn numbers(numbers: &[f64]) -> String {
+    let short = |x: &f64| {
+        let exact = format!("{x:?}");
+        if exact.len() > 20 { format!("{x:.12e}") } else { exact }
+    };
+    numbers.iter().map(short).collect::<Vec<_>>().join(", ")
 }
 
 fn beam_section(mesh: &Mesh, thread: &Thread, set: &str, out: &mut dyn Write) -> io::Result<()> {
@@ -162,11 +170,11 @@ fn beam_section(mesh: &Mesh, thread: &Thread, set: &str, out: &mut dyn Write) ->
         let axis = if name == "FLAT" { "0, 0, -1" } else { "1, 0, 0" };
         writeln!(
             out,
-            "*BEAM GENERAL SECTION, SECTION=GENERAL, ELSET={set}_{name}, DENSITY={:e}",
-            thread.linear_density / area
+            "*BEAM GENERAL SECTION, SECTION=GENERAL, ELSET={set}_{name}, DENSITY={}",
+            numbers(&[thread.linear_density / area])
         )?;
-        writeln!(out, "{area}, {second:e}, 0, {second:e}, {:e}", 2.0 * second)?;
-        writeln!(out, "{axis}\n{young}, {}", young / 2.0)?;
+        writeln!(out, "{}", numbers(&[area, second, 0.0, second, 2.0 * second]))?;
+        writeln!(out, "{axis}\n{}", numbers(&[young, young / 2.0]))?;
     }
     Ok(())
 }

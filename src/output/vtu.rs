@@ -282,7 +282,9 @@ pub(super) fn array<T: bytemuck::NoUninit>(
     // Little endian is stated in the file and true of every machine this is built for.
     const { assert!(cfg!(target_endian = "little")) };
     let name = escaped(name);
-    write!(w, "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"binary\">")?;
+    // readers make a table of one column of what says that it has one component
+    let count = if components == 1 { String::new() } else { format!(" NumberOfComponents=\"{components}\"") };
+    write!(w, "<DataArray type=\"{kind}\" Name=\"{name}\"{count} format=\"binary\">")?;
     let bytes: &[u8] = bytemuck::cast_slice(values);
     let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(deflated).collect::<io::Result<_>>()?;
     let mut header = vec![blocks.len() as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];

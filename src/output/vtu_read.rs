@@ -111,7 +111,7 @@ fn arrays<'a>(text: &'a str, section: &str) -> Vec<Array<'a>> {
         Some(Array {
             name: plain(attribute(tag, "Name")?),
             kind: attribute(tag, "type")?,
-            components: attribute(tag, "NumberOfComponents")?.parse().ok()?,
+            components: attribute(tag, "NumberOfComponents").map_or(Some(1), |count| count.parse().ok())?,
             binary: attribute(tag, "format")? == "binary",
             data: rest.split_once('<')?.0,
         })

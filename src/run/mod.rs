@@ -34,7 +34,6 @@ use crate::mesh::{Mesh, Ply};
 use crate::output::checkpoint::Checkpoint;
 use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH};
 use crate::output::{directory, file, vtu};
-use crate::schedule::Load;
 use crate::simulate::{Make, Retries, Simulation};
 use crossings::Crossed;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -220,7 +219,7 @@ struct Run<'a> {
     /// Mean width, thickness and gap of warp and weft before shear, mm.
     settled: Option<[[f64; 3]; 2]>,
     worst_balance: f64,
-    worst_kinetic: f64,
+    worst_kinetic: Option<f64>,
     largest_added: [f64; 2],
     dt_range: [f64; 2],
     place: Place,
@@ -233,12 +232,23 @@ struct Run<'a> {
     started: Instant,
 }
 
-/// How far a run has come: complete load steps, complete rows of the next one, and frames at angles or displacements in it.
+/// How far a run has come: complete load steps, and complete rows of the next one.
 #[derive(Debug, Clone, Copy, Default)]
 struct Place {
     phase: usize,
     row: usize,
-    marks: usize,
+}
+
+/// Shear angles, degrees, or displacements, mm, on a way from one to another where a frame is due: `marks`, whatever their sign. A
+/// load step has frames of its own where it starts and ends.
+fn places(marks: &[f64], ends: [f64; 2]) -> Vec<f64> {
+    /// Rounding of an angle.
+    const SAME: f64 = 1e-9;
+    let signed = marks.iter().flat_map(|mark| [-mark, *mark]);
+    let mut places: Vec<f64> = signed.filter(|place| ends.iter().all(|end| (place - end).abs() > SAME)).collect();
+    places.sort_by(|a, b| (a - ends[0]).abs().total_cmp(&(b - ends[0]).abs()));
+    places.dedup();
+    places
 }
 
 impl<'a> Run<'a> {
@@ -280,7 +290,7 @@ impl<'a> Run<'a> {
             last_shear: [0.0; 2],
             settled: None,
             worst_balance: 0.0,
-            worst_kinetic: 0.0,
+            worst_kinetic: None,
             largest_added: [0.0; 2],
             dt_range: [f64::INFINITY, 0.0],
             place: Place::default(),
@@ -313,27 +323,32 @@ impl<'a> Run<'a> {
         }
         self.wait();
         for (number, (phase, step)) in phases.iter().zip(&self.loaded.case.steps).enumerate().skip(self.place.phase) {
-            let (mut marks, unit, reach) = match step {
+            let (marks, unit, reach) = match step {
                 Step::Shear { .. } => (output.frames_at_deg.clone(), "deg", 1.0),
                 Step::Move { .. } => (output.frames_at_mm.clone(), "mm", self.loaded.case.domain.reach_mm()),
                 _ => (Vec::new(), "", 1.0),
             };
-            // one of the two is zero throughout
-            let loaded = |load: Load| load.angle.to_degrees().abs() + load.motion * reach;
-            marks.sort_by(f64::total_cmp);
-            let [before, after] = [phase.start, phase.end].map(|t| loaded(self.simulation.schedule.load(t)));
-            marks.retain(|mark| *mark > before && *mark < after);
             let rows = output.rows_per_step.max(1);
+            let time = |row: usize| phase.start + (phase.end - phase.start) * row as f64 / rows as f64;
+            let schedule = self.simulation.schedule.clone();
+            // of angle and displacement one does not change on the way
+            let way = |row: usize| {
+                let load = schedule.load(time(row));
+                load.angle.to_degrees() + load.motion * reach
+            };
+            let places = places(&marks, [way(0), way(rows)]);
             for row in self.place.row + 1..=rows {
-                let until = phase.start + (phase.end - phase.start) * row as f64 / rows as f64;
-                let arrived = self.reach(until)?;
-                self.write_row(phase.name)?;
+                let steps = self.simulation.step();
+                let arrived = self.reach(time(row))?;
+                // where there are more rows than time steps
+                if self.simulation.step() > steps {
+                    self.write_row(phase.name)?;
+                }
                 self.started += watch();
                 self.tell(&bar, phase.name);
-                let now = loaded(self.simulation.load());
-                while marks.get(self.place.marks).is_some_and(|mark| now >= *mark) {
-                    self.write_frame(&format!("{}{unit}", marks[self.place.marks]))?;
-                    self.place.marks += 1;
+                let [from, to] = [way(row - 1), way(row)];
+                for place in places.iter().filter(|place| (*place - from) * (*place - to) < 0.0 || **place == to) {
+                    self.write_frame(&format!("{place}{unit}"))?;
                 }
                 if output.frames_per_step > 0
                     && row < rows

@@ -72,8 +72,8 @@ fn value(case: &Case) -> Result<Value> {
 
 impl Recorded for Place {
     fn record(&mut self, record: &mut Record) {
-        let Self { phase, row, marks } = self;
-        [phase, row, marks].into_iter().for_each(|n| n.record(record));
+        let Self { phase, row } = self;
+        [phase, row].into_iter().for_each(|n| n.record(record));
     }
 }
 

@@ -112,7 +112,8 @@ impl Run<'_> {
             None => phase == "shear" && s.load().angle.to_degrees().abs() > SETTLED_DEG,
         };
         if sheared {
-            self.worst_kinetic = self.worst_kinetic.max(e.kinetic_total / e.internal());
+            let ratio = e.kinetic_total / e.internal();
+            self.worst_kinetic = Some(self.worst_kinetic.map_or(ratio, |worst| worst.max(ratio)));
         }
     }
 

@@ -47,8 +47,8 @@ impl Run<'_> {
             "added_mass": {
                 "floor_solids": floor(0..first),
                 "floor_threads": floor(first..s.mesh.nodes.len()),
-                "contact_solids_largest": self.largest_added[0],
-                "contact_threads_largest": self.largest_added[1],
+                "contact_solids_largest": self.largest_added[0] - floor(0..first),
+                "contact_threads_largest": self.largest_added[1] - floor(first..s.mesh.nodes.len()),
             },
             "worst_energy_balance": self.worst_balance,
             "worst_kinetic_over_internal_in_shear": self.worst_kinetic,
@@ -113,31 +113,47 @@ impl Run<'_> {
             );
         }
         if !self.curve.is_empty() {
+            // on the way out: coming back is another curve
+            let mut furthest = 0.0f64;
+            let out: Vec<&(f64, f64)> = self
+                .curve
+                .iter()
+                .filter(|(angle, _)| {
+                    let is_new = angle.abs() >= furthest;
+                    furthest = furthest.max(angle.abs());
+                    is_new
+                })
+                .collect();
             let at = |angle: f64| {
-                let near = self.curve.iter().filter(|(a, _)| (a.abs() - angle).abs() <= 1.0).map(|(_, f)| *f);
+                let near = out.iter().filter(|(a, _)| (a.abs() - angle).abs() <= 1.0).map(|(_, f)| *f);
                 let (sum, count) = near.fold((0.0, 0), |(s, n), f| (s + f, n + 1));
                 (count > 0).then(|| format!("{:.4} at {angle}°", sum / f64::from(count)))
             };
             let forces: Vec<String> = [5.0, 15.0, 25.0, 35.0, 45.0].into_iter().filter_map(at).collect();
             let _ = writeln!(t, "F_nor      {} N/mm (mean over ±1°)", forces.join(", "));
         }
+        let when = if self.pulled.is_some() { "while pulled" } else { "in shear" };
+        let kinetic = self.worst_kinetic.map_or(String::new(), |worst| {
+            if worst > 1.0 {
+                format!("; kinetic exceeds internal {when}, as where nothing is strained")
+            } else {
+                format!("; kinetic under {:.2} % of internal {when}", 100.0 * worst)
+            }
+        });
         let _ = writeln!(
             t,
-            "energy     internal {:.3} mJ, friction {:.3} mJ; balance within {:.2} %; kinetic under {:.2} % of internal {}",
-            e.internal(),
-            e.friction,
-            100.0 * self.worst_balance,
-            100.0 * self.worst_kinetic,
-            if self.pulled.is_some() { "while pulled" } else { "in shear" }
+            "energy     internal {} mJ, friction {} mJ; balance within {:.2} %{kinetic}",
+            shown(e.internal()),
+            shown(e.friction),
+            100.0 * self.worst_balance
         );
-        let _ = writeln!(
-            t,
-            "checks     smallest det F {:.3}; added mass at most {:.1} % of yarns, {:.1} % of threads; state {:016x}",
-            h.min_jacobian,
-            100.0 * self.largest_added[0],
-            100.0 * self.largest_added[1],
-            s.state_hash()
-        );
+        let bodies = [(s.mesh.hexes(), "yarns"), (s.mesh.beams(), "threads")].into_iter().zip(self.largest_added);
+        let added = bodies.filter(|((count, _), _)| *count > 0);
+        let added: Vec<String> = added.map(|((_, what), share)| format!("{:.1} % of {what}", 100.0 * share)).collect();
+        let squeezed =
+            if s.mesh.hexes() > 0 { format!("smallest det F {:.3}; ", h.min_jacobian) } else { String::new() };
+        let _ =
+            writeln!(t, "checks     {squeezed}added mass at most {}; state {:016x}", added.join(", "), s.state_hash());
         let picture = self
             .pictures
             .last()
@@ -159,4 +175,9 @@ impl Run<'_> {
             );
         }
     }
+}
+
+/// A number with three decimals, or with three digits where these would be zeros.
+fn shown(number: f64) -> String {
+    if number == 0.0 || number.abs() >= 0.1 { format!("{number:.3}") } else { format!("{number:.2e}") }
 }

@@ -1,6 +1,7 @@
 //! Guards: each names the cause, where it was, its size, and what to change.
 
 use super::Simulation;
+use crate::case::steps::Precision;
 use crate::contact::candidates::{self, CARRIER};
 use crate::contact::{EMPTY, of_key, status};
 use crate::error::{Error, Guard, Result};
@@ -40,8 +41,21 @@ impl Simulation {
                 100.0 * tolerance,
                 self.node_owner(node)
             );
-            return Err(self.guard("energy", culprit, "lower integration.safety or integration.dt_max_s"));
+            let advice = match self.make.precision {
+                Precision::F32 => {
+                    "lower integration.safety or integration.dt_max_s; if that does not help, it is rounding of very stiff parts \
+                     in f32: set integration.precision to f64"
+                }
+                Precision::F64 => "lower integration.safety or integration.dt_max_s",
+            };
+            return Err(self.guard("energy", culprit, advice));
         }
+        self.guard_penetration("raise the contact penalties or load more slowly")
+    }
+
+    /// Stops a scene whose bodies are too deep inside each other, with what to do about it.
+    fn guard_penetration(&self, advice: &str) -> Result<()> {
+        let h = &self.health;
         let allowed = self.case.integration.penetration_tolerance;
         let l = &self.model.limits;
         let kinds = [
@@ -53,10 +67,17 @@ impl Simulation {
             if depth > allowed * size && self.schedule.load(self.time).radius >= 1.0 {
                 let place = self.deepest(kind).map_or_else(String::new, |place| format!("; deepest now: {place}"));
                 let culprit = format!("{what} by {depth:.4} mm (tolerance {:.4} mm){place}", allowed * size);
-                return Err(self.guard("penetration", culprit, "raise the contact penalties or load more slowly"));
+                return Err(self.guard("penetration", culprit, advice));
             }
         }
         Ok(())
+    }
+
+    /// Stops a scene whose bodies overlap as they are given.
+    pub(super) fn guard_overlap(&self) -> Result<()> {
+        self.guard_penetration(
+            "they overlap at the start: move them apart, or let threads grow in pre-tension by effects.contact.initial_radius_ratio",
+        )
     }
 
     /// The contact of a kind (as in [`Health::penetration`](super::Health)) whose force is largest for its stiffness; `None` if

@@ -1,7 +1,7 @@
 //! The energy ledger: what is stored now, and what has been put in and lost since the start.
 
 use super::{Simulation, StressMean};
-use crate::contact::sums;
+use crate::contact::{status, sums};
 use crate::error::Result;
 use crate::kernel::stage::Stage;
 use crate::plan::Sums;
@@ -101,7 +101,9 @@ impl Simulation {
         let stages: Vec<Stage> = self.model.plan.collect.iter().filter(taken).cloned().collect();
         self.backend.run(&stages, &[row]);
         let totals = self.backend.scalars(self.model.totals.buffer);
+        let found = self.backend.uints(b.status);
         self.alive()?;
+        self.health.penetration = status::PENETRATION.map(|place| f64::from(f32::from_bits(found[place])));
         for buffer in [force, stiffness, b.status] {
             self.backend.clear(buffer);
         }

@@ -120,6 +120,14 @@ fn thread(thread: &InlineThread, path: &str, origin: &Origin) -> Result<()> {
             return Err(origin.error(&format!("{path}.nodes.{i}"), message));
         }
     }
+    let [first, last] = [thread.nodes.first(), thread.nodes.last()];
+    if thread.nodes.len() == 3
+        && first.zip(last).is_some_and(|(a, b)| difference(*a, *b).iter().all(|d| d.abs() < TOLERANCE_MM))
+    {
+        let message =
+            "the last node lies where the first does, and a ring has three beams or more: move it or add nodes";
+        return Err(origin.error(&format!("{path}.nodes"), message));
+    }
     Ok(())
 }
 
@@ -204,6 +212,11 @@ fn steps(case: &Case, mesh: &InlineMesh, origin: &Origin) -> Result<()> {
     if let Some(i) = mesh.conditions.iter().position(|c| !moves && c.displacement_mm != [0.0; 3]) {
         let path = format!("domain.mesh.conditions.{i}.displacement_mm");
         return Err(origin.error(&path, "is never applied: add a move step"));
+    }
+    let tightens = case.steps.iter().any(|step| matches!(step, Step::Pretension { .. }));
+    if let Some(i) = mesh.threads.iter().position(|t| !tightens && t.thermal_strain != 0.0) {
+        let path = format!("domain.mesh.threads.{i}.thermal_strain");
+        return Err(origin.error(&path, "is never applied: add a pretension step"));
     }
     Ok(())
 }
