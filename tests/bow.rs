@@ -104,6 +104,7 @@ fn a_bent_thread_that_is_hit_keeps_momentum_and_energy() {
             turn(&even(5), 0.02),
             &[
                 ("/domain/mesh/friction", json!(friction)),
+                ("/domain/mesh/threads/0/thermal_strain", json!(0)),
                 ("/effects/contact/damping_ratio", json!(0)),
                 ("/integration/dt_s", json!(5e-9)),
                 ("/steps", json!([{ "hold": { "time_s": 1.0 } }])),

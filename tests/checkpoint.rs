@@ -10,6 +10,7 @@ use std::process::Command;
 use std::time::Duration;
 use tricot::case::steps::Precision;
 use tricot::fabric;
+use tricot::output::lock::Lock;
 use tricot::plan::Capacity;
 use tricot::simulate::{Make, Simulation};
 
@@ -203,4 +204,27 @@ fn a_study_starts_from_the_end_of_a_load_step() {
         assert!(fails(&["--from", passing.to_str().unwrap()]).contains("midst of a load step"));
     }
     assert!(!folder.join("bad").exists());
+}
+
+/// While a run writes into a folder others are refused, and the folder is free once it is dead, whatever killed it.
+#[test]
+fn a_folder_has_one_run_at_a_time() {
+    let folder = folder(&with(short_cell(), &[("/steps/0/pretension/time_s", json!(5.0))]));
+    let dir = folder.path().join("cell");
+    let mut running = program(folder.path(), "cell", &[]).spawn().unwrap();
+    while !dir.join("state").is_dir() {
+        assert!(running.try_wait().unwrap().is_none(), "it has ended");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    for more in ["--force", "--resume"] {
+        let text = failed(&program(folder.path(), "cell", &[more]).output().unwrap(), 4);
+        assert!(text.contains(&format!("a run writes there now (process {} on ", running.id())), "{text}");
+        assert!(!dir.join("previous-1").exists());
+    }
+    running.kill().unwrap();
+    running.wait().unwrap();
+    Lock::take(&dir).unwrap();
+    let wrong = format!("--from={}", folder.path().join("case.json").display());
+    let text = failed(&program(folder.path(), "other", &[&wrong]).output().unwrap(), 4);
+    assert!(text.contains("is no checkpoint of this program"), "{text}");
 }

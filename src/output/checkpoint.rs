@@ -23,7 +23,9 @@ pub const FOLDER: &str = "state";
 /// Checkpoints that stay, besides those from the end of a load step.
 const KEPT: usize = 2;
 const EXTENSION: &str = "state";
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
+/// How the header of every checkpoint begins.
+const START: &[u8] = b"{\"format\":";
 
 /// What a state belongs to, and how it is laid out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -116,6 +118,10 @@ impl Checkpoint {
             let message = "this checkpoint is cut off or damaged: remove it, and the one before it will be used";
             Error::file(path, message)
         };
+        if !bytes.is_empty() && !bytes.starts_with(START) {
+            let message = "is no checkpoint of this program: give one of the files in state/ of a folder of results";
+            return Err(Error::file(path, message));
+        }
         let (body, hash) = bytes.split_last_chunk::<8>().ok_or_else(damaged)?;
         if xxh3_64(body) != u64::from_le_bytes(*hash) {
             return Err(damaged());

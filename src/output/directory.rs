@@ -1,6 +1,7 @@
 //! Where results go, and what happens to results that are already there. Nothing is ever deleted but what a stopped run
 //! wrote behind the checkpoint that it is resumed from.
 
+use super::lock::{self, Lock};
 use crate::case::parse::reason;
 use crate::error::{Error, Result};
 use std::fs;
@@ -58,21 +59,24 @@ pub fn check(dir: &Path, force: bool) -> Result<()> {
 /// touches earlier results.
 ///
 /// A folder that holds anything is refused unless `force` is given; then what an earlier run wrote there is moved to
-/// `dir/previous-1` (or the next free number), and everything else stays where it is.
-pub fn prepare(dir: &Path, force: bool) -> Result<()> {
+/// `dir/previous-1` (or the next free number), and everything else stays where it is. The folder is the caller's alone as long as it
+/// keeps what is returned.
+pub fn prepare(dir: &Path, force: bool) -> Result<Lock> {
     check(dir, force)?;
     fs::create_dir_all(dir).map_err(|e| Error::file(dir, format!("cannot create the folder: {}", reason(&e))))?;
-    writable(dir)?;
+    let lock = Lock::take(dir)?;
+    // another run may have been there in between
+    check(dir, force)?;
     let own: Vec<PathBuf> = list(dir)?.into_iter().filter(|path| is_own(path)).collect();
     if own.is_empty() {
-        return Ok(());
+        return Ok(lock);
     }
     let aside = make_aside(dir)?;
     for path in own {
         let target = aside.join(path.file_name().unwrap_or_default());
         fs::rename(&path, &target).map_err(|e| Error::file(&path, format!("cannot be moved aside: {}", reason(&e))))?;
     }
-    Ok(())
+    Ok(lock)
 }
 
 /// Removes what a stopped run left behind its checkpoint: half files, and frames and pictures from number `frames` on.
@@ -94,20 +98,14 @@ pub fn tidy(dir: &Path, frames: usize) -> Result<()> {
 fn list(dir: &Path) -> Result<Vec<PathBuf>> {
     let fail = |e: std::io::Error| Error::file(dir, reason(&e));
     let entries = fs::read_dir(dir).map_err(fail)?;
-    entries.map(|entry| entry.map(|e| e.path()).map_err(fail)).collect()
+    let paths = entries.map(|entry| entry.map(|e| e.path()).map_err(fail));
+    paths.filter(|path| !path.as_ref().is_ok_and(|path| path.ends_with(lock::NAME))).collect()
 }
 
 fn is_own(path: &Path) -> bool {
     let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     OWN.contains(&name) || OWN_EXTENSIONS.contains(&extension)
-}
-
-/// Finds out before hours of computing that nothing can be written.
-fn writable(dir: &Path) -> Result<()> {
-    let probe = dir.join(format!(".tricot-{}", std::process::id()));
-    fs::write(&probe, b"").map_err(|e| Error::file(dir, format!("cannot write there: {}", reason(&e))))?;
-    fs::remove_file(&probe).map_err(|e| Error::file(&probe, reason(&e)))
 }
 
 fn make_aside(dir: &Path) -> Result<PathBuf> {

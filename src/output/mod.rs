@@ -7,6 +7,7 @@
 //!   them, [`image`] holds pixels, with letters from [`text`] and colours from [`colour`];
 //! - [`page`]: a page of HTML that stands by itself, with charts from [`chart`] and [`scatter`];
 //! - [`checkpoint`]: the state of a run in one file, to go on from;
+//! - [`directory`]: where results go, one run at a time by its [`lock`];
 //! - [`mod@file`]: how a file is replaced as a whole or not at all.
 
 pub mod chart;
@@ -16,6 +17,7 @@ pub mod columns;
 pub mod directory;
 pub mod file;
 pub mod image;
+pub mod lock;
 pub mod map;
 pub mod page;
 pub mod picture;

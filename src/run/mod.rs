@@ -32,6 +32,7 @@ use crate::fabric;
 use crate::measure::yarns;
 use crate::mesh::{Mesh, Ply};
 use crate::output::checkpoint::Checkpoint;
+use crate::output::lock::Lock;
 use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH};
 use crate::output::{directory, file, vtu};
 use crate::simulate::{Make, Retries, Simulation};
@@ -42,10 +43,11 @@ use pulled::Pulled;
 use resume::Start;
 use rows::STRESS;
 use std::fmt;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// The case in a folder of results, with every default written out.
 pub const CASE: &str = "case.json";
@@ -174,11 +176,15 @@ fn drive(loaded: &Loaded, options: &Options, make: Make, watch: &mut dyn FnMut()
     let mut loaded = loaded.clone();
     loaded.case.integration.precision = make.precision;
     let mut simulation = simulation(&loaded, make)?;
+    let held = if options.resume && options.output.is_dir() { Some(Lock::take(&options.output)?) } else { None };
     let start = Start::of(&loaded.case, options, &mut simulation)?;
-    if !matches!(start, Start::Resumed(..)) {
-        directory::prepare(&options.output, options.force)?;
+    let _held = if matches!(start, Start::Resumed(..)) {
+        held
+    } else {
+        let held = directory::prepare(&options.output, options.force)?;
         write_case(&loaded.case, &options.output)?;
-    }
+        Some(held)
+    };
     let mut run = Run::new(&loaded, options, simulation, Arc::clone(&STOPPED))?;
     run.take_up(start)?;
     let result = run.go(watch);
@@ -230,6 +236,9 @@ struct Run<'a> {
     /// Wall time of the runs that this one goes on from, s.
     wall_before: f64,
     started: Instant,
+    began: SystemTime,
+    /// When a line about the progress was last printed.
+    told: Instant,
 }
 
 /// How far a run has come: complete load steps, and complete rows of the next one.
@@ -297,6 +306,8 @@ impl<'a> Run<'a> {
             due: None,
             wall_before: 0.0,
             started: Instant::now(),
+            began: SystemTime::now(),
+            told: Instant::now(),
         })
     }
 
@@ -418,23 +429,32 @@ impl<'a> Run<'a> {
         ProgressBar::new(1_000_000).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
     }
 
-    fn tell(&self, bar: &ProgressBar, phase: &str) {
+    /// Shows how far the run is: on a bar, or without a terminal by a line a minute.
+    fn tell(&mut self, bar: &ProgressBar, phase: &str) {
+        const EVERY: Duration = Duration::from_secs(60);
         let s = &self.simulation;
         let e = s.energies();
-        bar.set_position((s.time() / s.schedule.end() * 1e6) as u64);
+        let done = s.time() / s.schedule.end();
+        bar.set_position((done * 1e6) as u64);
         let load = s.load();
         let loaded = match s.mesh.period {
             Some(_) => format!("γ {:.1}°", load.angle.to_degrees()),
             None => format!("d {:.2} mm", s.displacement()),
         };
-        bar.set_message(format!(
+        let message = format!(
             "{phase} {loaded} step {} dt {:.2e} s, internal {:.3e} mJ, kinetic {:.1e} mJ, balance {:+.2} %",
             s.step(),
             s.dt(),
             e.internal(),
             e.kinetic,
             100.0 * s.health().balance
-        ));
+        );
+        if bar.is_hidden() && !self.options.quiet && self.told.elapsed() >= EVERY {
+            self.told = Instant::now();
+            // a reader that has gone away does not stop a run
+            let _ = writeln!(std::io::stderr(), "{:.1} %, {:.0} s: {message}", 100.0 * done, self.wall());
+        }
+        bar.set_message(message);
     }
 
     /// A frame for ParaView, and a picture of it.

@@ -4,9 +4,10 @@ use super::Run;
 use super::pulled::Pulled;
 use crate::error::Result;
 use crate::measure::stitches;
-use crate::output::file;
+use crate::output::{file, lock};
 use serde_json::json;
 use std::fmt::Write as _;
+use std::time::SystemTime;
 
 /// Part of the name of the fabric whose sizes were measured by tomography; warp and weft, width, thickness and gap, mm.
 pub(super) const PX35: &str = "PX35";
@@ -28,6 +29,13 @@ impl Run<'_> {
         let hash = s.alive().ok().map(|()| format!("{hash:016x}"));
         let summary = json!({
             "verdict": verdict,
+            "program": {
+                "version": env!("CARGO_PKG_VERSION"),
+                "command": std::env::args().collect::<Vec<_>>().join(" "),
+                "host": lock::host(),
+                "started": humantime::format_rfc3339_seconds(self.began).to_string(),
+                "ended": humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
+            },
             "case": self.loaded.case,
             "defaults": self.loaded.defaults.iter().map(|(path, value)| json!({"path": path, "value": value})).collect::<Vec<_>>(),
             "hexes": s.mesh.hexes(),
