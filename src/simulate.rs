@@ -569,19 +569,15 @@ impl Simulation {
             let (negative, place) = largest.of(&totals);
             (-negative, self.model.hex_at[place])
         });
-        self.health.penetration = status::PENETRATION.map(|p| f64::from(f32::from_bits(status[p])));
+        self.health.penetration = status::penetration(&status);
         let steps = (self.step - self.diagnosed).max(1) as u32;
         self.diagnosed = self.step;
         self.health.touching = status::TOUCHING.map(|p| status[p] / steps);
-        let first = self.model.first_thread;
-        let nodes = self.model.mass.len();
-        self.health.added_mass =
-            [(places.added[0], 0..first), (places.added[1], first..nodes)].map(|(added, range)| {
-                let [mass, truly] =
-                    [&self.model.mass, &self.model.true_mass].map(|m| m[range.clone()].iter().sum::<f64>());
-                let by_contact = added.map_or(0.0, |added| added.of(&totals, 0));
-                if truly > 0.0 { (mass - truly + by_contact) / truly } else { 0.0 }
-            });
+        self.health.added_mass = std::array::from_fn(|kind| {
+            let by_contact = places.added[kind].map_or(0.0, |added| added.of(&totals, 0));
+            let [truly, floor] = self.model.whole_mass[kind];
+            if truly > 0.0 { (floor + by_contact) / truly } else { 0.0 }
+        });
         let mut cleared = status;
         for place in [status::CONTACT_RATE].into_iter().chain(status::PENETRATION).chain(status::TOUCHING) {
             cleared[place] = 0;

@@ -25,6 +25,16 @@ pub enum Domain {
     Mesh(InlineMesh),
 }
 
+impl InlineThread {
+    /// Whether it is a ring: its last node lies where its first does.
+    pub fn is_ring(&self) -> bool {
+        /// Nodes closer than this along every axis are the same place, mm.
+        const SAME_MM: f64 = 1e-6;
+        let ends = self.nodes.first().zip(self.nodes.last());
+        ends.is_some_and(|(first, last)| (0..3).all(|k| (first[k] - last[k]).abs() < SAME_MM))
+    }
+}
+
 impl Domain {
     /// Largest displacement that is prescribed, mm.
     pub fn reach_mm(&self) -> f64 {

@@ -96,6 +96,10 @@ pub mod status {
     pub const TRAVEL: usize = 1;
     /// Largest penetration of a thread into a yarn, of yarns, of threads; bits of an f32, mm.
     pub const PENETRATION: [usize; 3] = [2, 3, 4];
+    /// These penetrations, mm.
+    pub fn penetration(status: &[u32]) -> [f64; 3] {
+        PENETRATION.map(|place| f64::from(f32::from_bits(status[place])))
+    }
     /// Largest contact stiffness over mass, bits of an f32, 1/s².
     pub const CONTACT_RATE: usize = 5;
     /// Nodes and beams that touch something.

@@ -6,9 +6,6 @@ use crate::error::{Error, Result};
 use crate::mesh::vector::{Vector, norm, sub, unit};
 use crate::mesh::{Block, Mesh, Part, Ply, Thread, quality};
 
-/// Nodes closer than this are the same place, mm.
-const SAME_MM: f64 = 1e-6;
-
 /// Builds the blocks and threads of an inline mesh.
 pub fn build(inline: &InlineMesh) -> Result<Mesh> {
     let mut mesh = Mesh::default();
@@ -100,8 +97,7 @@ fn add_thread(mesh: &mut Mesh, thread: &InlineThread, place: &str) -> Result<()>
             "coincides with the node before it".into()
         })?;
     }
-    // a thread that ends where it starts is a ring
-    let closed = norm(sub(nodes[count - 1], nodes[0])) < SAME_MM;
+    let closed = thread.is_ring();
     require(!closed || count > 3, &format!("{place}.nodes"), || "closes after two beams, but a ring has three".into())?;
     let (count, beams) = (count - usize::from(closed), count - 1);
     let first = mesh.nodes.len();

@@ -62,8 +62,8 @@ const FINER: usize = 2;
 /// Rows of samples that are drawn as one piece of work.
 const BAND: usize = 64;
 
-/// How often triangles may cover the picture before the large ones are left out: those of a fabric of two plies do so about ten
-/// times, those of a state that came apart without end.
+/// How often triangles, by their boxes, may cover the picture before the large ones are left out: those of a state that came apart
+/// cover it without end.
 const LAYERS: f32 = 100.0;
 
 /// The scene in all its periodic images, given by their displacements in mm.
@@ -168,16 +168,7 @@ impl Triangle {
             (high > 0.0 && low < size as f32).then(|| [low.max(0.0) as usize, (high as usize + 1).min(size)])
         };
         let (columns, rows) = (reach(0, camera.width)?, reach(1, camera.height)?);
-        let [a, b, c] = corners;
-        let whole = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-        if whole.abs() <= 1e-9 {
-            return None;
-        }
-        let edge = |p: [f32; 3], q: [f32; 3]| {
-            let (dx, dy) = ((p[1] - q[1]) / whole, (q[0] - p[0]) / whole);
-            [dx, dy, -(dx * p[0] + dy * p[1])]
-        };
-        let weights = [edge(b, c), edge(c, a), edge(a, b)];
+        let weights = weights(corners)?;
         let depth = std::array::from_fn(|i| (0..3).map(|k| weights[k][i] * corners[k][2]).sum());
         let cut = corners.iter().any(|c| !clip.shows(camera.plane(c[0], c[1], c[2])));
         Some(Self { source, weights, depth, columns, rows, cut })
@@ -220,11 +211,14 @@ impl Triangle {
     }
 }
 
-/// Weights of the corners of a screen triangle at a point; `None` where it has no area.
-fn weights([a, b, c]: [[f32; 3]; 3], x: f32, y: f32) -> Option<[f32; 3]> {
-    let edge = |p: [f32; 3], q: [f32; 3]| (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
+/// Weights of the corners of a screen triangle; `None` where it has no area.
+fn weights([a, b, c]: [[f32; 3]; 3]) -> Option<[Plane; 3]> {
     let whole = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-    (whole.abs() > 1e-9).then(|| [edge(b, c) / whole, edge(c, a) / whole, edge(a, b) / whole])
+    let edge = |p: [f32; 3], q: [f32; 3]| {
+        let (dx, dy) = ((p[1] - q[1]) / whole, (q[0] - p[0]) / whole);
+        [dx, dy, -(dx * p[0] + dy * p[1])]
+    };
+    (whole.abs() > 1e-9).then(|| [edge(b, c), edge(c, a), edge(a, b)])
 }
 
 /// A visible point of a surface.
@@ -242,7 +236,8 @@ impl Surface {
     fn at(quad: &Quad, shift: [f32; 3], second: bool, camera: &Camera, [x, y]: [usize; 2]) -> Self {
         let corners = halves(second);
         let screen = corners.map(|i| camera.project(add(quad.corners[i], shift)));
-        let w = weights(screen, x as f32 + 0.5, y as f32 + 0.5).unwrap_or([1.0, 0.0, 0.0]);
+        let at = |[dx, dy, at]: Plane| dx * (x as f32 + 0.5) + dy * (y as f32 + 0.5) + at;
+        let w = weights(screen).map_or([1.0, 0.0, 0.0], |weights| weights.map(at));
         let blend = |values: &[[f32; 3]; 4]| {
             let part = |k: usize| scale(values[corners[k]], w[k]);
             add(add(part(0), part(1)), part(2))

@@ -56,6 +56,8 @@ pub struct Model {
     /// True mass of every node, tonne, and mass with the floor.
     pub true_mass: Vec<f64>,
     pub mass: Vec<f64>,
+    /// Of all solids and of all threads: true mass, and what the floor adds to it, tonne.
+    pub whole_mass: [[f64; 2]; 2],
     pub first_thread: usize,
     /// Block and lane of each hexahedron, in the order of the mesh.
     pub hex_place: Vec<(usize, usize)>,
@@ -547,6 +549,10 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         plan: b.plan,
         forces,
         collect_motion,
+        whole_mass: [0..first, first..nodes].map(|range| {
+            let [mass, truly] = [&floored, &true_mass].map(|mass| mass[range.clone()].iter().sum::<f64>());
+            [truly, mass - truly]
+        }),
         true_mass,
         mass: floored,
         first_thread: first,

@@ -19,12 +19,7 @@ impl Run<'_> {
     pub(super) fn write_summary(&self, verdict: &str) -> Result<()> {
         let s = &self.simulation;
         let (e, h) = (s.energies(), s.health());
-        let sum = |m: &[f64]| m.iter().sum::<f64>();
-        let first = s.model.first_thread;
-        let floor = |range: std::ops::Range<usize>| {
-            let mass = sum(&s.model.true_mass[range.clone()]);
-            if mass > 0.0 { sum(&s.model.mass[range]) / mass - 1.0 } else { 0.0 }
-        };
+        let floor = s.model.whole_mass.map(|[truly, added]| if truly > 0.0 { added / truly } else { 0.0 });
         let hash = s.state_hash();
         let hash = s.alive().ok().map(|()| format!("{hash:016x}"));
         let summary = json!({
@@ -53,10 +48,10 @@ impl Run<'_> {
             "wall_s": self.wall(),
             "stage_wall_s": s.timings().into_iter().map(|(name, t)| json!({"stage": name, "s": t})).collect::<Vec<_>>(),
             "added_mass": {
-                "floor_solids": floor(0..first),
-                "floor_threads": floor(first..s.mesh.nodes.len()),
-                "contact_solids_largest": self.largest_added[0] - floor(0..first),
-                "contact_threads_largest": self.largest_added[1] - floor(first..s.mesh.nodes.len()),
+                "floor_solids": floor[0],
+                "floor_threads": floor[1],
+                "contact_solids_largest": self.largest_added[0] - floor[0],
+                "contact_threads_largest": self.largest_added[1] - floor[1],
             },
             "worst_energy_balance": self.worst_balance,
             "worst_kinetic_over_internal_in_shear": self.worst_kinetic,

@@ -103,7 +103,7 @@ impl Simulation {
         let totals = self.backend.scalars(self.model.totals.buffer);
         let found = self.backend.uints(b.status);
         self.alive()?;
-        self.health.penetration = status::PENETRATION.map(|place| f64::from(f32::from_bits(found[place])));
+        self.health.penetration = status::penetration(&found);
         for buffer in [force, stiffness, b.status] {
             self.backend.clear(buffer);
         }

@@ -120,10 +120,7 @@ fn thread(thread: &InlineThread, path: &str, origin: &Origin) -> Result<()> {
             return Err(origin.error(&format!("{path}.nodes.{i}"), message));
         }
     }
-    let [first, last] = [thread.nodes.first(), thread.nodes.last()];
-    if thread.nodes.len() == 3
-        && first.zip(last).is_some_and(|(a, b)| difference(*a, *b).iter().all(|d| d.abs() < TOLERANCE_MM))
-    {
+    if thread.nodes.len() == 3 && thread.is_ring() {
         let message =
             "the last node lies where the first does, and a ring has three beams or more: move it or add nodes";
         return Err(origin.error(&format!("{path}.nodes"), message));
