@@ -118,7 +118,8 @@ impl Checkpoint {
             let message = "this checkpoint is cut off or damaged: remove it, and the one before it will be used";
             Error::file(path, message)
         };
-        if !bytes.is_empty() && !bytes.starts_with(START) {
+        // one that has the name of a checkpoint is a damaged one
+        if !bytes.starts_with(START) && path.extension().is_none_or(|e| e != EXTENSION) {
             let message = "is no checkpoint of this program: give one of the files in state/ of a folder of results";
             return Err(Error::file(path, message));
         }
