@@ -14,7 +14,7 @@ use tricot::run::simulation;
 use tricot::simulate::{Make, Simulation};
 
 /// A quick pre-tension, so that contact is as busy as in most of a run, and where timing starts, s.
-const QUICK: [&str; 2] = ["steps.0.pretension.time_s=1e-4", "steps.1.hold.time_s=5e-5"];
+const QUICK: [&str; 2] = ["steps.0.pretension.time_s=1e-4", "steps.1.stretch.time_s=5e-5"];
 const START: f64 = 1.6e-4;
 /// Steps that are timed.
 const STEPS: u64 = 1024;

@@ -19,7 +19,7 @@ use tricot::run::simulation;
 use tricot::simulate::{Make, Simulation};
 
 /// Tightens the stitch soon, so that contact is as busy as in most of a run.
-const QUICK: [&str; 2] = ["steps.0.pretension.time_s=3e-4", "steps.1.hold.time_s=1e-4"];
+const QUICK: [&str; 2] = ["steps.0.pretension.time_s=3e-4", "steps.1.stretch.time_s=1e-4"];
 /// A little way into shear, s: where timing starts.
 const START: f64 = 4.5e-4;
 /// Steps that are timed.
@@ -33,7 +33,7 @@ fn main() {
     let mut cell = simulation(&loaded, make.clone()).expect("the cell can be built");
     cell.advance(START, |_| false).expect("the cell runs");
 
-    let row = cell.schedule.row(cell.time(), cell.dt(), cell.dt());
+    let row = cell.schedule.row(cell.time(), cell.dt(), cell.dt(), |_| [1.0; 2]);
     let mut criterion = Criterion::default()
         .sample_size(10)
         .warm_up_time(Duration::from_millis(200))

@@ -9,7 +9,7 @@ use tricot::run::simulation;
 use tricot::simulate::Make;
 
 /// Tightens the stitch soon, so that contact is as busy as in most of a run.
-const QUICK: [&str; 2] = ["steps.0.pretension.time_s=3e-4", "steps.1.hold.time_s=1e-4"];
+const QUICK: [&str; 2] = ["steps.0.pretension.time_s=3e-4", "steps.1.stretch.time_s=1e-4"];
 /// A little way into shear, s: where timing starts.
 const START: f64 = 4.5e-4;
 /// Steps of one iteration: those between two looks at energies and limits.

@@ -1,5 +1,6 @@
 //! The command line: arguments in, one library call, text or one line of error out.
 
+use clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -8,6 +9,7 @@ use tricot::case::read::{Loaded, read};
 use tricot::case::{schema, steps};
 use tricot::error::{Error, Result};
 use tricot::output::directory;
+use tricot::output::picture::View;
 use tricot::run;
 use tricot::study::accuracy::{self, accuracy};
 use tricot::study::compare::compare;
@@ -92,6 +94,9 @@ enum Command {
         /// Folder of the mesh [default: results/<name of the case>-mesh]
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
+        /// Use a folder that holds results: they are moved to DIR/previous-N
+        #[arg(long)]
+        force: bool,
     },
     /// Check a case without running it.
     Check {
@@ -143,9 +148,22 @@ enum Command {
         /// Folder of a run (its last frame is drawn), or a frame (.vtu)
         #[arg(value_name = "DIR_OR_FRAME")]
         source: PathBuf,
-        /// Field that colours the surface [default: the bodies]
-        #[arg(long)]
+        /// Frame of the folder: its number, or what stands behind the number in its name, as 25deg [default: the last one]
+        #[arg(long, value_name = "FRAME")]
+        frame: Option<String>,
+        /// Field that colours the surface, a vector with its component (NAME.x, .y, .z or .length) [default: the bodies]
+        #[arg(long, value_name = "NAME")]
         field: Option<String>,
+        /// Values at both ends of the colours [default: those of the frame]
+        #[arg(
+            long,
+            value_name = "LOW,HIGH",
+            value_delimiter = ',',
+            num_args = 2,
+            allow_negative_numbers = true,
+            requires = "field"
+        )]
+        range: Option<Vec<f64>>,
         /// Width of the picture in pixels
         #[arg(long, default_value_t = 1600, value_parser = clap::value_parser!(u16).range(300..=6000))]
         width: u16,
@@ -288,7 +306,9 @@ fn main() -> ExitCode {
     unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) if !error.use_stderr() => return finish(&error.to_string(), 0),
+        Err(error) if !error.use_stderr() || error.kind() == DisplayHelpOnMissingArgumentOrSubcommand => {
+            return finish(&error.to_string(), 0);
+        }
         Err(error) => return fail(&usage(&error), BAD_INPUT),
     };
     std::panic::set_hook(Box::new(|panic| {
@@ -323,9 +343,9 @@ fn perform(command: Command) -> Result<Done> {
             let code = if outcome.interrupted { INTERRUPTED } else { 0 };
             return Ok(Done { text: outcome.to_string(), code });
         }
-        Command::Mesh { case, output } => {
+        Command::Mesh { case, output, force } => {
             let dir = output.unwrap_or_else(|| beside(&case.case, "-mesh"));
-            run::mesh(&case.read()?, &dir)?
+            run::mesh(&case.read()?, &dir, force)?
         }
         Command::Check { case, explain } => run::check(&case.read()?, explain)?,
         Command::Devices => run::devices(),
@@ -366,9 +386,11 @@ fn perform(command: Command) -> Result<Done> {
             let study = step(&case.read()?, every, confirm)?;
             return Ok(Done { text: study.text, code: if study.held { 0 } else { UNEXPECTED } });
         }
-        Command::Picture { source, field, width, output } => {
+        Command::Picture { source, frame, field, range, width, output } => {
             let out = output.unwrap_or_else(|| picture_path(&source));
-            run::picture(&source, field.as_deref(), width.into(), &out)?
+            let range = range.map(|ends| [ends[0], ends[1]]);
+            let view = View { field, range, width_px: width.into(), ..View::default() };
+            run::picture(&source, frame.as_deref(), &view, &out)?
         }
     };
     Ok(Done { text, code: 0 })
@@ -387,12 +409,11 @@ fn picture_path(source: &Path) -> PathBuf {
 
 /// The first paragraph of a message about the command line, on one line.
 fn usage(error: &clap::Error) -> String {
-    if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return "no command given (try --help)".into();
-    }
     let text = error.to_string();
     let first: Vec<&str> = text.lines().take_while(|l| !l.is_empty()).map(str::trim).collect();
-    format!("{} (try --help)", first.join(" ").trim_start_matches("error: "))
+    let tip = text.lines().find_map(|line| line.trim().strip_prefix("tip: "));
+    let tip = tip.map_or(String::new(), |tip| format!("; {tip}"));
+    format!("{}{tip} (try --help)", first.join(" ").trim_start_matches("error: "))
 }
 
 /// Prints to stdout; a reader that has gone away is no failure.

@@ -1,9 +1,9 @@
 //! Load steps in time: what is prescribed at any moment, as smooth functions, and as the row of one time step.
 
 use crate::case::effects::Effects;
-use crate::case::steps::Step;
+use crate::case::steps::{Along, Step};
 use crate::kernel::row::Row;
-use crate::measure::shear::trellis;
+use crate::measure::shear::gradient;
 
 /// The load steps of a case.
 #[derive(Debug, Clone)]
@@ -19,6 +19,9 @@ pub struct Phase {
     /// Start and end, s.
     pub start: f64,
     pub end: f64,
+    /// What holds a cell along x and y, and whether this is the step that brings it there.
+    pub along: [Along; 2],
+    pub stretches: bool,
     from: Load,
     to: Load,
     /// Damping rates of solids and of threads, 1/s.
@@ -44,7 +47,7 @@ fn smooth(t: f64) -> f64 {
 }
 
 /// A ramp of constant velocity, but for the first and the last tenth, over which the velocity grows and falls linearly.
-fn ramp(t: f64) -> f64 {
+pub fn ramp(t: f64) -> f64 {
     const ENDS: f64 = 0.1;
     let rise = |t: f64| t * t / (2.0 * ENDS);
     let total = 1.0 - ENDS;
@@ -64,11 +67,16 @@ impl Schedule {
         let pretensioned = steps.iter().any(|s| matches!(s, Step::Pretension { .. }));
         let radius = if pretensioned { initial_radius } else { 1.0 };
         let mut load = Load { angle: 0.0, thermal: 0.0, radius, motion: 0.0 };
+        let mut along = [Along::Held; 2];
         let mut start = 0.0;
         let mut phases = Vec::new();
         for step in steps {
             let to = match *step {
                 Step::Settle { .. } | Step::Hold { .. } => load,
+                Step::Stretch { warp, weft, .. } => {
+                    along = [weft, warp];
+                    load
+                }
                 Step::Pretension { .. } => Load { thermal: 1.0, radius: 1.0, ..load },
                 Step::Shear { angle_deg, .. } => Load { angle: angle_deg.to_radians(), ..load },
                 Step::Move { to, .. } => Load { motion: to, ..load },
@@ -76,10 +84,11 @@ impl Schedule {
             let end = start + step.time();
             let damping = effects.damping.as_ref().map_or([0.0; 2], |d| match step {
                 Step::Settle { .. } | Step::Pretension { .. } => [d.rate_per_s, d.thread_settle_rate_per_s],
-                Step::Hold { .. } | Step::Shear { .. } => [d.rate_per_s; 2],
+                Step::Hold { .. } | Step::Shear { .. } | Step::Stretch { .. } => [d.rate_per_s; 2],
                 Step::Move { .. } => [d.move_rate_per_s.unwrap_or(d.rate_per_s); 2],
             });
-            phases.push(Phase { name: step.name(), start, end, from: load, to, damping });
+            let stretches = matches!(step, Step::Stretch { .. });
+            phases.push(Phase { name: step.name(), start, end, along, stretches, from: load, to, damping });
             (load, start) = (to, end);
         }
         Self { phases, initial_radius: radius.min(initial_radius) }
@@ -114,12 +123,13 @@ impl Schedule {
         }
     }
 
-    /// The row of a step at `time` that goes on by `dt` and was reached by `before`.
-    pub fn row(&self, time: f64, dt: f64, before: f64) -> Row<f64> {
-        let now = self.load(time);
-        let last = self.load((time - before).max(0.0));
+    /// The row of a step at `time` that goes on by `dt` and was reached by `before`; `stretch` is that of the fibre directions of a cell
+    /// at a time, which is known while the run goes on.
+    pub fn row(&self, time: f64, dt: f64, before: f64, stretch: impl Fn(f64) -> [f64; 2]) -> Row<f64> {
+        let (now, last) = (self.load(time), self.load((time - before).max(0.0)));
         let next = self.load(time + dt);
-        let [f, old] = [now.angle, last.angle].map(trellis);
+        let f = gradient(now.angle, stretch(time));
+        let old = gradient(last.angle, stretch((time - before).max(0.0)));
         let mut row = Row { dt, dt_mid: 0.5 * (dt + before), ..Row::default() };
         for i in 0..2 {
             for j in 0..2 {
@@ -151,7 +161,7 @@ mod tests {
         let steps = [Step::Pretension { time_s: 1.0 }, Step::Hold { time_s: 1.0 }, Step::Move { to: 1.0, time_s: 1.0 }];
         let schedule = Schedule::new(&steps, &effects);
         let rates = |time: f64| {
-            let row = schedule.row(time, 1e-3, 1e-3);
+            let row = schedule.row(time, 1e-3, 1e-3, |_| [1.0; 2]);
             [row.damping_solid, row.damping_thread]
         };
         assert_eq!([0.5, 1.5, 2.5].map(rates), [[3.0, 5.0], [3.0, 3.0], [2.0, 2.0]]);

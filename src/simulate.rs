@@ -11,10 +11,12 @@ mod limit;
 mod retry;
 mod snapshot;
 mod state;
+mod stretch;
 
 pub use ledger::Energies;
 pub use limit::Limit;
 pub use retry::Retries;
+pub use stretch::Fibres;
 
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
@@ -36,6 +38,7 @@ use crate::mesh::Mesh;
 use crate::plan::{self, Capacity, Model};
 use crate::schedule::{Load, Schedule};
 use std::sync::Arc;
+use stretch::Stretch;
 
 /// Fewest steps between two looks at the distance travelled.
 const BURST: u64 = 8;
@@ -108,6 +111,9 @@ pub struct Simulation {
     /// Step of the last look at energies and limits.
     diagnosed: u64,
     gradient_at_search: Load,
+    /// And the stretch then.
+    stretch_at_search: [f64; 2],
+    stretch: Stretch,
     energies: Energies,
     start_energy: f64,
     largest_flow: f64,
@@ -198,6 +204,8 @@ impl Simulation {
         let schedule = Schedule::new(&case.steps, &case.effects);
         Ok(Self {
             gradient_at_search: schedule.load(0.0),
+            stretch_at_search: [1.0; 2],
+            stretch: Stretch::of(&mesh),
             hold_from: hold_from(case, &schedule),
             holds: true,
             schedule,
@@ -268,6 +276,18 @@ impl Simulation {
     pub fn load(&self) -> Load {
         self.schedule.load(self.time)
     }
+    /// Length of a cell along x and y now, over that at the start.
+    pub fn stretch(&self) -> [f64; 2] {
+        self.stretch.at(self.time)
+    }
+    /// The row of a step at `time` that goes on by `dt` and was reached by `before`.
+    fn row(&self, time: f64, dt: f64, before: f64) -> Row<f64> {
+        self.schedule.row(time, dt, before, |time| self.stretch.at(time))
+    }
+    /// What the scene was made from.
+    pub fn case(&self) -> &Case {
+        &self.case
+    }
     pub fn backend(&self) -> &dyn Backend {
         &*self.backend
     }
@@ -297,10 +317,11 @@ impl Simulation {
             self.begin()?;
         }
         while self.time < until * (1.0 - 1e-12) {
+            self.steer();
             let (from, steps, window) = (self.time - self.dt_before, self.step, self.window());
             let looked = loop {
                 // rounding may leave a step that is hardly there: the last one of a window is looked at, so it is taken
-                let remaining = ((until - self.time) / self.dt).ceil().max(1.0) as u64;
+                let remaining = ((until.min(self.phase_end()) - self.time) / self.dt).ceil().max(1.0) as u64;
                 let left = remaining.min(steps + window - self.step);
                 let burst = left.min(self.burst);
                 if let Some(looked) = self.burst(burst, burst == left)? {
@@ -315,9 +336,15 @@ impl Simulation {
         Ok(())
     }
 
+    /// End of the load step that the next time step belongs to, s: windows do not reach beyond it.
+    fn phase_end(&self) -> f64 {
+        let phases = self.schedule.phases();
+        phases.get(self.schedule.phase_at(self.time + 0.5 * self.dt)).map_or(f64::INFINITY, |phase| phase.end)
+    }
+
     /// Steps until the next look at energies.
     fn window(&self) -> u64 {
-        let rate = |time: f64| self.schedule.row(time, self.dt, self.dt).rate;
+        let rate = |time: f64| self.row(time, self.dt, self.dt).rate;
         let (now, then) = (rate(self.time), rate(self.time + WINDOW as f64 * self.dt));
         let change = largest([0, 1, 2].map(|i| [0, 1, 2].map(|j| then[i][j] - now[i][j])));
         if change > STEADY * largest(then).max(largest(now)) { BURST } else { WINDOW }
@@ -330,7 +357,7 @@ impl Simulation {
         self.dt_before = self.dt;
         self.search_all()?;
         self.threads_at_rest();
-        let totals = self.diagnose(self.schedule.row(self.time, self.dt, self.dt_before))?;
+        let totals = self.diagnose(self.row(self.time, self.dt, self.dt_before))?;
         self.guard_step()?;
         self.choose_dt();
         self.dt_before = self.dt;
@@ -348,7 +375,7 @@ impl Simulation {
         let mut time = self.time;
         let looked_at = self.diagnosed == self.step;
         for step in 0..steps {
-            let row = self.schedule.row(time, self.dt, self.dt_before);
+            let row = self.row(time, self.dt, self.dt_before);
             // thermal work by the trapezoidal rule; across a look, the tension after it stands for both
             let (back, ahead) = (row.thermal_increment, self.schedule.load(time + self.dt).thermal - row.thermal);
             let first = if step == 0 && looked_at { back } else { 0.5 * back };
@@ -371,7 +398,9 @@ impl Simulation {
         let before = std::mem::replace(&mut self.speed, f64::from(f32::from_bits(status[status::SPEED])));
         let travel = f64::from(f32::from_bits(status[status::TRAVEL]));
         let load = self.load();
-        let affine = (load.angle - self.gradient_at_search.angle).abs() * AFFINE_REACH;
+        let (stretch, then) = (self.stretch(), self.stretch_at_search);
+        let strained = [0, 1].map(|k| (stretch[k] - then[k]).abs()).into_iter().fold(0.0, f64::max);
+        let affine = ((load.angle - self.gradient_at_search.angle).abs() + strained) * AFFINE_REACH;
         let contact = self.case.effects.contact.as_ref().filter(|_| self.model.active.searches());
         let skin = contact.map_or(f64::INFINITY, |c| c.skin_mm);
         let mut left = SKIN_USED * skin - travel - affine;
@@ -436,6 +465,7 @@ impl Simulation {
         self.search()?;
         self.searched = 0;
         self.gradient_at_search = self.load();
+        self.stretch_at_search = self.stretch();
         Ok(())
     }
 
@@ -447,7 +477,7 @@ impl Simulation {
         }
         let mut crowded = None;
         for _ in 0..8 {
-            let row = self.schedule.row(self.time, self.dt, self.dt_before);
+            let row = self.row(self.time, self.dt, self.dt_before);
             self.backend.run(&self.model.plan.search, &[row]);
             let status = self.backend.uints(self.model.buffers.status);
             self.alive()?;

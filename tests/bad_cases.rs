@@ -92,7 +92,15 @@ fn results_are_not_overwritten_without_force() {
 #[test]
 fn the_command_line_is_checked() {
     let here = Path::new(".");
-    assert_eq!(one_line(&tricot(&[], here), 2), "error: no command given (try --help)\n");
+    for alone in [&[][..], &["study"]] {
+        let help = tricot(alone, here);
+        assert_eq!(help.status.code(), Some(0));
+        assert!(String::from_utf8_lossy(&help.stdout).contains("Usage: tricot"), "{help:?}");
+    }
+    assert!(one_line(&tricot(&["chek", GOOD], here), 2).contains("'check'"));
+    assert!(one_line(&tricot(&["run", GOOD, "--frce"], here), 2).contains("'--force'"));
+    let fabric = one_line(&tricot(&["check", "cases/fabrics/px35.json"], here), 2);
+    assert!(fabric.contains("this is a fabric, not a case"), "{fabric}");
     assert!(one_line(&tricot(&["run"], here), 2).contains("<CASE>"));
     assert!(one_line(&tricot(&["walk"], here), 2).contains("walk"));
     assert!(one_line(&tricot(&["run", GOOD, "--threads", "0"], here), 2).contains("1..=1024"));
@@ -125,7 +133,7 @@ fn set_error(set: &str) -> String {
 fn wrong_overrides_are_named() {
     let cases = [
         ("steps", "--set steps: no `=`: write PATH=VALUE"),
-        ("=1", "--set =1: no `` in a case; allowed: accuracy,"),
+        ("=1", "--set =1: no `` in a case; allowed: $schema, accuracy,"),
         ("steps.3.shear.angle_deg=30", "no entry `3` in the list `steps`, which holds 3, from 0"),
         ("steps.x=30", "no entry `x` in the list `steps`"),
         ("steps.2.shear.angle=30", "no `angle` in `steps.2.shear`; did you mean `angle_deg`?"),

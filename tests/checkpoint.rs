@@ -2,12 +2,12 @@
 
 mod common;
 
-use common::program::{can_resume, contents, failed, folder, hash, kill_after, program, ran, same};
+use common::program::{can_resume, contents, copy, failed, folder, hash, kill_after, program, ran, same};
 use common::{advance, bare, block, loaded, neo_hookean, short_cell, with};
 use serde_json::{Value, json};
 use std::fs;
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tricot::case::steps::Precision;
 use tricot::fabric;
 use tricot::output::lock::Lock;
@@ -115,6 +115,64 @@ fn a_run_killed_at_any_moment_goes_on_to_the_same_files() {
     assert!(kills >= 6, "{kills} kills: the runs are too short to be stopped");
 }
 
+/// What a scheduler does: the same command again and again, whenever it was killed, and once more at the end.
+#[cfg(unix)]
+#[test]
+fn one_command_starts_goes_on_and_says_that_it_is_finished() {
+    let folder = folder(&short_cell());
+    let folder = folder.path();
+    ran(folder, "whole", &[]);
+    let wall = Instant::now();
+    ran(folder, "timed", &["--resume"]);
+    let wall = wall.elapsed();
+    same(folder, "whole", "timed");
+    let mut kills = 0;
+    for output in 0.. {
+        let output = format!("killed-{output}");
+        // some before there is a checkpoint, some before there is a case
+        for wait in [2, 6, 12, 20, 30, 40, 50, 60, 70, 80].into_iter().chain(std::iter::repeat(100)) {
+            let child = program(folder, &output, &["--resume"]).spawn().unwrap();
+            let (killed, ended) = kill_after(child, wall * wait / 100);
+            kills += u32::from(killed);
+            if ended {
+                break;
+            }
+        }
+        same(folder, "whole", &output);
+        if kills >= 10 {
+            break;
+        }
+    }
+    println!("{kills} kills in runs of {:.2} s", wall.as_secs_f64());
+    let before = contents(&folder.join("killed-0"));
+    let output = program(folder, "killed-0", &["--resume"]).stdout(std::process::Stdio::piped()).output().unwrap();
+    assert!(output.status.success());
+    assert!(String::from_utf8_lossy(&output.stdout).contains("is finished already"), "{output:?}");
+    assert!(before == contents(&folder.join("killed-0")), "what is finished stays as it is");
+}
+
+/// Two runs that are started at once: one does everything, the other is told so and touches nothing.
+#[test]
+fn of_two_runs_at_once_one_is_refused() {
+    let folder = folder(&short_cell());
+    let folder = folder.path();
+    ran(folder, "whole", &[]);
+    for (round, more) in [&[][..], &["--resume"], &["--force"]].into_iter().enumerate() {
+        let output = format!("both-{round}");
+        let [first, second] =
+            [0, 1].map(|_| program(folder, &output, more).stderr(std::process::Stdio::piped()).spawn());
+        let outputs = [first, second].map(|child| child.unwrap().wait_with_output().unwrap());
+        let refused: Vec<_> = outputs.iter().filter(|output| !output.status.success()).collect();
+        // one that comes so late that the other is finished has nothing left to do, or moves its results aside
+        assert!(refused.len() < 2 && (refused.len() == 1 || !more.is_empty()), "{outputs:?}");
+        for output in refused {
+            let text = failed(output, 4);
+            assert!(text.contains("a run writes there now") || text.contains("not empty"), "{text}");
+        }
+        assert_eq!(hash(&folder.join("whole")), hash(&folder.join(&output)));
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_goes_on_to_the_same_files() {
@@ -140,8 +198,14 @@ fn what_cannot_be_resumed_is_named_and_nothing_is_touched() {
     let folder = folder(&short_cell());
     let folder = folder.path();
     let fails = |output: &str, more: &[&str]| failed(&program(folder, output, more).output().unwrap(), 4);
-    assert!(fails("none", &["--resume"]).contains("no checkpoint in state/"));
     ran(folder, "cell", &[]);
+    fs::create_dir(folder.join("notes")).unwrap();
+    fs::write(folder.join("notes/notes.txt"), "mine").unwrap();
+    assert!(fails("notes", &["--resume"]).contains("the folder is not empty"));
+    let lost = folder.join("lost");
+    copy(&folder.join("cell"), &lost);
+    fs::remove_dir_all(lost.join("state")).unwrap();
+    assert!(fails("lost", &["--resume"]).contains("no checkpoint in state/, but there are rows"));
     let dir = folder.join("cell");
     let before = contents(&dir);
 
@@ -182,8 +246,8 @@ fn a_study_starts_from_the_end_of_a_load_step() {
     ran(folder, "first", &[]);
     let states = contents(&folder.join("first/state"));
     let named = |end: &str| states.iter().map(|(p, _)| p.to_str().unwrap()).find(|p| p.ends_with(end)).unwrap();
-    let hold = named("-2-hold.state");
-    ran(folder, "again", &["--from", hold]);
+    let stretched = named("-2-stretch.state");
+    ran(folder, "again", &["--from", stretched]);
     assert_eq!(hash(&folder.join("first")), hash(&folder.join("again")));
     let rows = |name: &str, file: &str| {
         let text = fs::read_to_string(folder.join(name).join(file)).unwrap();
@@ -193,11 +257,11 @@ fn a_study_starts_from_the_end_of_a_load_step() {
         assert_eq!(rows("first", file)[12..], rows("again", file)[..], "{file}");
     }
     // later steps may change, what made the state may not
-    ran(folder, "other", &["--from", hold, "--set", "steps.2.shear.angle_deg=-2", "--set", "title=other"]);
+    ran(folder, "other", &["--from", stretched, "--set", "steps.2.shear.angle_deg=-2", "--set", "title=other"]);
     assert!(rows("other", "history.csv").last().unwrap().contains(",shear,"));
     let fails = |more: &[&str]| failed(&program(folder, "bad", more).output().unwrap(), 4);
-    let text = fails(&["--from", hold, "--set", "steps.1.hold.time_s=1e-5"]);
-    assert!(text.contains("steps.1.hold.time_s is 0.00001, but 0.00002 in the checkpoint"), "{text}");
+    let text = fails(&["--from", stretched, "--set", "steps.1.stretch.time_s=1e-5"]);
+    assert!(text.contains("steps.1.stretch.time_s is 0.00001, but 0.00002 in the checkpoint"), "{text}");
     assert!(fails(&["--from", named("-3-shear.state")]).contains("behind all of them"));
     assert!(fails(&["--from", "none.state"]).contains("none.state"));
     if let Some((passing, _)) = states.iter().find(|(p, _)| !p.to_str().unwrap().contains('-')) {

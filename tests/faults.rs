@@ -104,8 +104,8 @@ fn lost_position(state: &mut Checkpoint) {
 /// The checkpoint from the end of the second load step; all later ones are removed.
 fn only_hold(results: &Path) -> PathBuf {
     let states = contents(&results.join("state"));
-    states.iter().filter(|(p, _)| !p.ends_with_name("-2-hold.state")).for_each(|(p, _)| fs::remove_file(p).unwrap());
-    states.into_iter().map(|(p, _)| p).find(|p| p.ends_with_name("-2-hold.state")).unwrap()
+    states.iter().filter(|(p, _)| !p.ends_with_name("-2-stretch.state")).for_each(|(p, _)| fs::remove_file(p).unwrap());
+    states.into_iter().map(|(p, _)| p).find(|p| p.ends_with_name("-2-stretch.state")).unwrap()
 }
 
 trait Named {
@@ -135,7 +135,7 @@ fn a_fault_in_memory_stops_the_run_and_it_goes_on_from_its_checkpoint() {
         let sound = fs::read(&state).unwrap();
         let mut struck = Checkpoint::read(&state).unwrap();
         fault(&mut struck);
-        struck.write(&dir, Some("2-hold")).unwrap();
+        struck.write(&dir, Some("2-stretch")).unwrap();
         let text = failed(&program(folder, name, &["--resume"]).output().unwrap(), 3);
         println!("{name}: {text}");
         assert!(causes.iter().any(|cause| text.contains(&format!("stopped by the {cause} guard at step"))), "{text}");
@@ -246,18 +246,11 @@ fn a_run_killed_at_random_goes_on_to_the_same_hash() {
         moments.push(format!("{moment:.3}"));
         let (alive, _) = kill_after(program(folder, &output, &[]).spawn().unwrap(), Duration::from_secs_f64(moment));
         killed += u64::from(alive);
-        // before the first checkpoint there is nothing to go on from, and the program says so
-        let go_on = if can_resume(&folder.join(&output)) { "--resume" } else { "--force" };
-        if go_on == "--force" && folder.join(&output).exists() {
-            let text = failed(&program(folder, &output, &["--resume"]).output().unwrap(), 4);
-            assert!(text.contains("no checkpoint in state/: start anew without --resume"), "{text}");
-        }
-        resumed += u64::from(go_on == "--resume");
-        ran(folder, &output, &[go_on]);
+        // before the first checkpoint it starts anew
+        resumed += u64::from(can_resume(&folder.join(&output)));
+        ran(folder, &output, &["--resume"]);
         assert_eq!(hash(&folder.join("whole")), hash(&folder.join(&output)), "seed {seed}, killed at {moment} s");
-        if go_on == "--resume" {
-            same(folder, "whole", &output);
-        }
+        same(folder, "whole", &output);
         fs::remove_dir_all(folder.join(&output)).unwrap();
     }
     println!("seed {seed}: {killed} kills of a run of {wall:.2} s, {resumed} resumed, at {} s", moments.join(", "));

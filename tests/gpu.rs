@@ -359,7 +359,7 @@ fn compare(device: &Arc<Device>, simulation: &Simulation, findings: &mut Finding
         }
     }
     let (time, dt) = (simulation.time(), simulation.dt());
-    let row = Row { approach: 100.0, ..simulation.schedule.row(time, dt, dt) };
+    let row = Row { approach: 100.0, ..simulation.schedule.row(time, dt, dt, |_| [1.0; 2]) };
     for stage in stages(model).filter(|stage| stage.count > 0) {
         for buffer in stage.reads.iter().chain(stage.writes.iter().map(|(b, _)| b)) {
             gpu.set_bytes(*buffer, &cpu.bytes(*buffer));

@@ -28,14 +28,14 @@ const SMALL: [&str; 7] = [
     "resolution.weft_columns=6",
     "resolution.slice_mm=0.6",
     "steps.0.pretension.time_s=1e-3",
-    "steps.1.hold.time_s=2e-4",
+    "steps.1.stretch.time_s=2e-4",
     "steps.2.shear.angle_deg=10",
     "steps.2.shear.time_s=2e-3",
 ];
 /// Shortest run that has searches and every kind of contact.
 const SHORT: [&str; 4] = [
     "steps.0.pretension.time_s=1e-4",
-    "steps.1.hold.time_s=2e-5",
+    "steps.1.stretch.time_s=2e-5",
     "steps.2.shear.time_s=5e-5",
     // so short a tightening is a blow
     "integration.energy_tolerance=100",
@@ -61,6 +61,8 @@ fn device() -> Option<Arc<Device>> {
 struct Result {
     sizes: Vec<f64>,
     forces: Vec<f64>,
+    /// Membrane forces along the wefts and the warps at the end, N/mm.
+    fibres: [f64; 2],
     touching: [u32; 3],
 }
 
@@ -87,7 +89,7 @@ fn result(mut cell: Simulation) -> Result {
         cell.backend().describe()
     );
     println!("    sizes {sizes:.5?} mm, F_nor {forces:.5?} N/mm, touching {:?}", cell.health().touching);
-    Result { sizes, forces, touching: cell.health().touching }
+    Result { sizes, forces, fibres: cell.fibres().map(|f| f.force), touching: cell.health().touching }
 }
 
 /// Root mean square of the relative differences.
@@ -110,6 +112,11 @@ fn a_small_cell_tightens_and_shears_as_on_the_cpu() {
     let difference = apart(&ours.forces, &exact.forces);
     println!("F_nor: GPU and CPU differ by {:.3} %, runs on the CPU by {:.3} %", 100.0 * difference, 100.0 * spread);
     assert!(difference < spread.max(0.01), "{difference}");
+    println!("membrane forces {:.4?} and {:.4?} N/mm", ours.fibres, exact.fibres);
+    for (ours, exact) in ours.fibres.iter().zip(&exact.fibres) {
+        // held fibres pull with some 0.2 N/mm here
+        assert!((ours - exact).abs() < 0.02, "{ours} and {exact} N/mm along fibres that are driven");
+    }
     for (ours, exact) in ours.sizes.iter().zip(&exact.sizes) {
         assert!((ours - exact).abs() < 1e-3, "{ours} mm and {exact} mm after tightening");
     }
@@ -152,7 +159,8 @@ fn a_device_that_is_lost_leaves_whole_results() {
     let Some(device) = device() else { return };
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("cell");
-    let options = Options { machine: Machine::Gpu, threads: None, ..options(output.clone(), 0) };
+    let adapter = device.listed().name.clone();
+    let options = Options { machine: Machine::Gpu, adapter, threads: None, ..options(output.clone(), 0) };
     let make = Make { device: Some(Arc::clone(&device)), ..Make::default() };
     let rows = || fs::read_to_string(output.join("history.csv")).unwrap_or_default().lines().count();
     let error = std::thread::scope(|scope| {
@@ -240,8 +248,14 @@ fn the_program_names_the_device_and_refuses_what_it_cannot_do() {
     let output = program(&["--adapter", "no such thing"], &[], folder.path());
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(message.contains("`no such thing`") && message.contains(&device.listed().name), "{message}");
-    let output = program(&[], &[], folder.path());
+    let output = program(&["--adapter", &device.listed().name], &[], folder.path());
     assert!(output.status.success(), "{output:?}");
+    if device.is_software() {
+        let output = program(&["--force"], &[], folder.path());
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(5), "{message}");
+        assert!(message.contains("computes on the CPU") && message.contains("--adapter"), "{message}");
+    }
     let summary = fs::read(folder.path().join("cell/summary.json")).unwrap();
     let summary: Value = serde_json::from_slice(&summary).unwrap();
     assert!(summary["backend"].as_str().unwrap().contains(&device.listed().name), "{summary:#}");
@@ -252,10 +266,10 @@ fn the_program_names_the_device_and_refuses_what_it_cannot_do() {
 #[cfg(target_os = "linux")]
 fn validation_layers_find_nothing() {
     const LAYER: &str = "VK_LAYER_KHRONOS_validation";
-    let Some(_) = device() else { return };
+    let Some(device) = device() else { return };
     let folder = tempfile::tempdir().unwrap();
     let layer = [("VK_INSTANCE_LAYERS", LAYER), ("VK_LOADER_DEBUG", "layer")];
-    let output = program(&[], &layer, folder.path());
+    let output = program(&["--adapter", &device.listed().name], &layer, folder.path());
     let said = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()).concat();
     if !said.contains(LAYER) && std::env::var_os("TRICOT_REQUIRE_ADAPTER").is_none() {
         return println!("skipped: {LAYER} is not installed");

@@ -88,7 +88,7 @@ impl Scene {
         }
         let never = vec![found::NEVER; places.len()];
         self.cpu.set_bytes(faces.found, bytemuck::cast_slice(&never));
-        let row = self.simulation.schedule.row(0.0, 1e-9, 1e-9);
+        let row = self.simulation.schedule.row(0.0, 1e-9, 1e-9, |_| [1.0; 2]);
         self.cpu.run(&model.plan.search, &[row]);
         let contact = model.plan.step.iter().filter(|stage| stage.name == "thread-yarn contact").cloned();
         self.cpu.run(&contact.collect::<Vec<_>>(), &[row]);

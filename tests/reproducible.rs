@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{advance, coarse_cell, loaded};
+use common::{advance, coarse_cell, loaded, short_cell};
 use tricot::case::steps::Precision;
 use tricot::fabric;
 use tricot::kernel::lane::Isa;
@@ -17,7 +17,7 @@ fn bits_do_not_depend_on_threads_or_instruction_set() {
         let mut makes: Vec<Make> = [1, 1, 2, 7].map(|threads| Make { precision, threads, ..Make::default() }).into();
         makes.extend(Isa::available().into_iter().map(|isa| Make { precision, threads: 2, isa, ..Make::default() }));
         for make in makes {
-            let mut simulation = run::simulation(&loaded(&coarse_cell()), make.clone()).unwrap();
+            let mut simulation = run::simulation(&loaded(&short_cell()), make.clone()).unwrap();
             advance(&mut simulation, 2.5e-4);
             let touching = simulation.health().touching;
             let hash = simulation.state_hash();

@@ -11,6 +11,7 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tricot::case::read::{Loaded, read};
+use tricot::output::picture::View;
 use tricot::output::table::{HISTORY, STITCHES, YARNS};
 use tricot::output::vtu_read;
 use tricot::run::{Outcome, picture, run};
@@ -24,7 +25,7 @@ const COARSE: [&str; 9] = [
     "resolution.weft_columns=6",
     "resolution.slice_mm=0.5",
     "steps.0.pretension.time_s=3e-4",
-    "steps.1.hold.time_s=2e-5",
+    "steps.1.stretch.time_s=2e-5",
     "steps.2.shear.time_s=1e-4",
     "steps.2.shear.angle_deg=3",
     "output.rows_per_step=10",
@@ -33,6 +34,10 @@ const COARSE: [&str; 9] = [
 
 fn sets(more: &[&str]) -> Vec<String> {
     COARSE.iter().chain(more).map(|s| s.to_string()).collect()
+}
+
+fn view(field: Option<&str>) -> View {
+    View { field: field.map(str::to_owned), width_px: 400, ..View::default() }
 }
 
 fn coarse() -> Loaded {
@@ -86,7 +91,7 @@ fn a_run_leaves_what_the_readme_says() {
     let (folder, outcome) = ran();
     let dir = folder.path().join("cell");
     assert!(!outcome.interrupted);
-    assert!(outcome.text.lines().count() <= 10 && outcome.text.contains("finished"), "{}", outcome.text);
+    assert!(outcome.text.lines().count() <= 12 && outcome.text.contains("finished"), "{}", outcome.text);
 
     assert_eq!(table(&dir.join("history.csv")).0, HISTORY);
     assert_eq!(table(&dir.join("yarns.csv")).0, YARNS);
@@ -100,6 +105,19 @@ fn a_run_leaves_what_the_readme_says() {
     assert!((angles.last().unwrap() - 3.0).abs() < 1e-9);
     assert!(column(&dir.join("history.csv"), "min_jacobian").iter().all(|j| *j > 0.1));
     assert!(column(&dir.join("stitches.csv"), "tension_mean_n")[9] > 0.01, "the stitch is tight");
+
+    // the stress of a row belongs to the angle in its middle: there its power is that of F_nor
+    let angles: Vec<f64> = angles.iter().map(|degrees| degrees.to_radians()).collect();
+    let force = column(&dir.join("history.csv"), "f_nor_n_per_mm");
+    let stress = ["p_xx", "p_xy", "p_yx", "p_yy"].map(|p| column(&dir.join("stress.csv"), &format!("{p}_n_per_mm")));
+    let largest = force.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
+    // where the shear gathers and loses speed, time and angle are not in step
+    for row in 22..29 {
+        let (sin, cos) = (0.25 * (angles[row] + angles[row - 1])).sin_cos();
+        let [xx, xy, yx, yy] = [0, 1, 2, 3].map(|k| stress[k][row]);
+        let power = 0.5 * (cos * (xy + yx) - sin * (xx + yy)) / (0.5 * (angles[row] + angles[row - 1])).cos();
+        assert!((power - force[row]).abs() < 5e-3 * largest, "row {row}: {power} and {} N/mm", force[row]);
+    }
 
     let summary = summary(&dir);
     let keys = [
@@ -144,16 +162,31 @@ fn frames_read_back_and_can_be_drawn() {
     assert!((last.angle_deg - 3.0).abs() < 1e-9);
 
     let out = folder.path().join("tension.png");
-    let text = picture(&dir, Some("tension_n"), 400, &out).unwrap();
+    let text = picture(&dir, None, &view(Some("tension_n")), &out).unwrap();
     assert!(text.contains("3-shear.vtu") && text.contains("tension.png"), "{text}");
     assert!(fs::read(&out).unwrap().starts_with(b"\x89PNG"));
-    let error = picture(&dir, Some("tension"), 400, &out).unwrap_err();
+    let error = picture(&dir, None, &view(Some("tension")), &out).unwrap_err();
     assert!(error.to_string().contains("available: ") && error.to_string().contains("tension_n"), "{error}");
     assert_eq!(error.exit_code(), 2);
+    let text = picture(&dir, Some("0"), &view(Some("velocity_mm_s.z")), &out).unwrap();
+    assert!(text.contains("0000-start.vtu drawn") && text.ends_with("which is replaced"), "{text}");
+    assert!(picture(&dir, Some("1-pretension"), &view(None), &out).unwrap().contains("0001-1-pretension.vtu"));
+    for (frame, field, out, wanted) in [
+        (Some("25deg"), None, "x.png", "has no frame 25deg; there are 0000-start, 0001-1-pretension"),
+        (None, Some("velocity_mm_s"), "x.png", "is a vector: give one of velocity_mm_s.x"),
+        (None, Some("tension_n.x"), "x.png", "has no components"),
+        (None, None, "x.jpg", "x.jpg: pictures are written as PNG"),
+    ] {
+        let error = picture(&dir, frame, &view(field), &folder.path().join(out)).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{error}");
+    }
+    let view_of = |range| View { range: Some(range), ..view(Some("tension_n")) };
+    assert!(picture(&dir, None, &view_of([1.0, 0.0]), &out).unwrap_err().to_string().contains("is no range"));
+    picture(&dir, None, &view_of([0.0, 1.0]), &out).unwrap();
     fs::remove_file(dir.join("case.json")).unwrap();
-    let error = picture(&frames[0], None, 400, &out).unwrap_err().to_string();
+    let error = picture(&frames[0], None, &view(None), &out).unwrap_err().to_string();
     assert!(error.contains("case.json"), "{error}");
-    let error = picture(folder.path(), None, 400, &out).unwrap_err();
+    let error = picture(folder.path(), None, &view(None), &out).unwrap_err();
     assert!(error.to_string().contains("run.pvd") && error.exit_code() == 4, "{error}");
 }
 

@@ -19,7 +19,12 @@ fn nodes<'a>(node: &'a Value, path: &str, field: bool, found: &mut Vec<(String, 
     }
     for keyword in ["oneOf", "anyOf"] {
         for child in node.get(keyword).and_then(Value::as_array).into_iter().flatten() {
+            let first = found.len();
             nodes(child, path, false, found);
+            // what the one field of a variant means stands with the variant
+            if child.get("description").is_some() && child.get("required").is_some() {
+                found[first..].iter_mut().skip(1).take(1).for_each(|own| own.2 = false);
+            }
         }
     }
     if let Some(child) = node.get("items") {

@@ -61,7 +61,7 @@ fn copy<R: Run>(simulation: &Simulation) -> Cpu<R> {
     for buffer in (0..plan.buffers.len()).map(Buffer) {
         backend.set_bytes(buffer, &simulation.backend().bytes(buffer));
     }
-    let row = simulation.schedule.row(simulation.time(), simulation.dt(), simulation.dt());
+    let row = simulation.schedule.row(simulation.time(), simulation.dt(), simulation.dt(), |_| [1.0; 2]);
     backend.run(&plan.step, &[row; 5]);
     backend.run(&plan.diagnose, &[row]);
     backend
@@ -78,7 +78,7 @@ fn check<R: Run>(case: &Value, until: f64, precision: Precision, rounding: f64) 
     let mut backend = copy::<R>(&simulation);
     let model = &simulation.model;
     let (plan, places, nodes) = (&model.plan, &model.totals, simulation.mesh.nodes.len());
-    let row = simulation.schedule.row(simulation.time(), simulation.dt(), simulation.dt());
+    let row = simulation.schedule.row(simulation.time(), simulation.dt(), simulation.dt(), |_| [1.0; 2]);
     let before: Vec<Vec<f64>> = (0..plan.buffers.len())
         .map(|b| if plan.buffers[b].kind == Kind::Scalar { backend.scalars(Buffer(b)) } else { vec![] })
         .collect();

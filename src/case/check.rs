@@ -8,8 +8,9 @@ mod specimen;
 use super::Case;
 use super::domain::Domain;
 use super::origin::Origin;
-use super::steps::Step;
+use super::steps::{Along, Step};
 use crate::error::Result;
+use std::collections::BTreeMap;
 
 /// Most hexahedra of one case.
 pub const MAX_HEXES: f64 = 5e7;
@@ -26,11 +27,35 @@ pub fn check(case: &Case, origin: &Origin) -> Result<()> {
         return Err(origin.error("title", "holds a line break or control character, write one line"));
     }
     steps(case, origin)?;
+    probes(case, origin)?;
     match &case.domain {
         Domain::Cell { warps, wefts } => cell::check(case, *warps, *wefts, origin),
         Domain::Specimen(specimen) => specimen::check(case, specimen, origin),
         Domain::Mesh(mesh) => inline::check(case, mesh, origin),
     }
+}
+
+/// Refuses names that are used twice, or that a table cannot hold.
+fn distinct<'a>(names: impl Iterator<Item = (String, &'a String)>, what: &str, origin: &Origin) -> Result<()> {
+    let mut known = BTreeMap::new();
+    for (path, name) in names {
+        if name.chars().any(char::is_control) {
+            return Err(origin.error(&path, "holds a line break or control character, write one line"));
+        }
+        if name.contains([',', '"']) {
+            return Err(origin.error(&path, "holds a comma or a quote, which tables cannot: leave it out"));
+        }
+        if let Some(first) = known.insert(name, path.clone()) {
+            return Err(origin.error(&path, format!("\"{name}\" is the name of {first} too, give each {what} its own")));
+        }
+    }
+    Ok(())
+}
+
+/// Places of probes that the case itself shows to be none.
+fn probes(case: &Case, origin: &Origin) -> Result<()> {
+    let probes = case.output.probes.iter().enumerate();
+    distinct(probes.map(|(i, probe)| (format!("output.probes.{i}.name"), &probe.name)), "probe", origin)
 }
 
 fn steps(case: &Case, origin: &Origin) -> Result<()> {
@@ -55,6 +80,19 @@ fn steps(case: &Case, origin: &Origin) -> Result<()> {
             return Err(origin.error(&format!("steps.{i}.{field}"), message));
         }
         *now = next;
+    }
+    let mut along = [Along::Held; 2];
+    for (i, step) in case.steps.iter().enumerate() {
+        let Step::Stretch { warp, weft, .. } = step else { continue };
+        if !matches!(case.domain, Domain::Cell { .. }) {
+            let message = "only a cell has a stretch of its own: use move, with conditions on nodes";
+            return Err(origin.error(&format!("steps.{i}"), message));
+        }
+        if along == [*weft, *warp] {
+            let message = "both directions are so already: say what changes in warp or weft, or use hold";
+            return Err(origin.error(&format!("steps.{i}"), message));
+        }
+        along = [*weft, *warp];
     }
     let total: f64 = case.steps.iter().map(Step::time).sum();
     let (name, dt) = match case.integration.dt_s {

@@ -228,6 +228,10 @@ fn rest_curvature() -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
+    /// Name in the table of reactions. Default `condition N`, N its number from 0.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = 100))]
+    pub name: Option<String>,
     /// Nodes whose reference position lies in this box `[[x, y, z], [x, y, z]]` (bounds included, 1e-6 mm tolerance), mm.
     #[schemars(inner(inner(range(min = -1e6, max = 1e6))))]
     pub within: [[f64; 3]; 2],

@@ -47,6 +47,34 @@ pub struct Yarn {
     pub areal_mass_g_m2: f64,
     /// Constitutive law of the yarn.
     pub material: Material,
+    /// Sizes measured on the real fabric, for comparison; a run takes no notice of them. Default null.
+    #[serde(default)]
+    pub measured: Option<Measured>,
+}
+
+/// Sizes of the yarns of a ply, mean and standard deviation, mm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Measured {
+    /// How they were measured, e.g. `tomography`.
+    #[schemars(length(min = 1, max = 30))]
+    pub by: String,
+    /// Width, across the yarn.
+    #[schemars(inner(range(min = 0, max = 100)))]
+    pub width_mm: [f64; 2],
+    /// Thickness at the centre.
+    #[schemars(inner(range(min = 0, max = 20)))]
+    pub thickness_mm: [f64; 2],
+    /// Gap between neighbours.
+    #[schemars(inner(range(min = 0, max = 100)))]
+    pub gap_mm: [f64; 2],
+}
+
+impl Measured {
+    /// Width, thickness and gap as text, mm.
+    pub fn texts(&self) -> [String; 3] {
+        [self.width_mm, self.thickness_mm, self.gap_mm].map(|[mean, spread]| format!("{mean:.2} ± {spread:.2}"))
+    }
 }
 
 fn truncation() -> f64 {

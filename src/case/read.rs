@@ -43,7 +43,16 @@ pub fn read(path: &Path, overrides: &[String]) -> Result<Loaded> {
         origin.overrides.push(set);
     }
     inline_fabric(&mut value, &mut origin)?;
+    if ["domain", "steps"].iter().all(|name| value.get(name).is_none()) && value.get("stitch").is_some() {
+        let message = "this is a fabric, not a case: give a case that names it in its field `fabric`";
+        return Err(origin.error("", message));
+    }
     conform(&value, Shape::new(&schema)).map_err(|fault| origin.error(&fault.path, fault.message))?;
+    for place in ["", "/fabric"] {
+        if let Some(fields) = value.pointer_mut(place).and_then(Value::as_object_mut) {
+            fields.remove(schema::SCHEMA);
+        }
+    }
     let written = value.clone();
     if let Some(accuracy) = Accuracy::of(&value) {
         fill(&mut value, &accuracy.fields());

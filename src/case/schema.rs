@@ -3,21 +3,66 @@
 
 use super::{Case, fabric::Fabric};
 use schemars::schema_for;
-use serde_json::Value;
+use serde_json::{Map, Value, json};
+
+/// Name of the field in which a file may say where its schema is, for editors.
+pub const SCHEMA: &str = "$schema";
 
 /// Schema of a case.
 pub fn case() -> Value {
-    schema_for!(Case).to_value()
+    let mut schema = schema_for!(Case).to_value();
+    name_schema(&mut schema["properties"]);
+    name_schema(&mut schema["$defs"]["Fabric"]["properties"]);
+    schema
 }
 
 /// Schema of a fabric file.
 pub fn fabric() -> Value {
-    schema_for!(Fabric).to_value()
+    let mut schema = schema_for!(Fabric).to_value();
+    name_schema(&mut schema["properties"]);
+    schema
 }
 
-/// A schema as indented JSON, as `tricot schema` prints it.
+fn name_schema(fields: &mut Value) {
+    let what = "Where the schema of this file is, for editors; a run takes no notice of it.";
+    fields[SCHEMA] = json!({ "description": what, "type": "string" });
+}
+
+/// A schema as indented JSON, as `tricot schema` prints it. Alternatives that each have one field of another name become one object
+/// with at most one of these fields: an editor then names the field that is wrong, where of alternatives it can only say that none
+/// fits.
 pub fn text(schema: &Value) -> String {
+    let mut schema = schema.clone();
+    merge(&mut schema);
     format!("{schema:#}")
+}
+
+fn merge(node: &mut Value) {
+    match node {
+        Value::Object(fields) => fields.values_mut().for_each(merge),
+        Value::Array(items) => items.iter_mut().for_each(merge),
+        _ => {}
+    }
+    let Some(forms) = node.get("oneOf").and_then(Value::as_array) else { return };
+    let tag = |form: &Value| {
+        let name = form["required"].as_array().filter(|names| names.len() == 1)?[0].as_str()?;
+        let mut field = form["properties"].as_object().filter(|fields| fields.len() == 1)?.get(name)?.clone();
+        // what the alternative means
+        if let (Some(fields), Some(meaning)) = (field.as_object_mut(), form.get("description")) {
+            fields.entry("description").or_insert_with(|| meaning.clone());
+        }
+        Some((name.to_owned(), field))
+    };
+    let Some(fields) = forms.iter().map(tag).collect::<Option<Map<String, Value>>>() else { return };
+    let Some(merged) = node.as_object_mut() else { return };
+    merged.remove("oneOf");
+    merged.insert("type".into(), json!("object"));
+    merged.insert("properties".into(), Value::Object(fields));
+    for (limit, value) in
+        [("minProperties", json!(1)), ("maxProperties", json!(1)), ("additionalProperties", json!(false))]
+    {
+        merged.insert(limit.into(), value);
+    }
 }
 
 /// A place in a schema, for walking along it.

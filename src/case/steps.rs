@@ -25,11 +25,25 @@ pub enum Step {
         #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,
     },
-    /// Trellis shear of a periodic cell to `angle_deg`, from the angle before: F̄ = [[cos γ/2, sin γ/2], [sin γ/2, cos γ/2]].
+    /// Trellis shear of a periodic cell to `angle_deg`, from the angle before: F̄ = [[cos γ/2, sin γ/2], [sin γ/2, cos γ/2]], its
+    /// columns times the stretches of wefts and warps.
     Shear {
         /// Shear angle at the end, degrees, −80 to 80.
         #[schemars(range(min = -80, max = 80))]
         angle_deg: f64,
+        /// Duration, s.
+        #[schemars(range(min = 1e-9, max = 10))]
+        time_s: f64,
+    },
+    /// How long the fibres of a periodic cell are, from here on: over the step the cell goes from how it is to how it shall be, and
+    /// there it stays in the steps behind. Before the first such step both directions are held at their length.
+    Stretch {
+        /// Along the warps, y. Default held.
+        #[serde(default)]
+        warp: Along,
+        /// Along the wefts, x. Default held.
+        #[serde(default)]
+        weft: Along,
         /// Duration, s.
         #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,
@@ -47,6 +61,22 @@ pub enum Step {
     },
 }
 
+/// What holds a periodic cell along one of its fibre directions.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Along {
+    /// It stays as long as it is.
+    #[default]
+    Held,
+    /// It is as long as in a cell that is pulled at one corner while the two beside it are free: the membrane force along the
+    /// fibres is F_nor (1 + sin γ).
+    CornerDriven,
+    /// It is stretched to this length, over the one at the start.
+    To(#[schemars(range(min = 0.8, max = 1.25))] f64),
+    /// It has this membrane force, N per mm across the fibres; 0 lets it free.
+    ForceNPerMm(#[schemars(range(min = -1000, max = 1000))] f64),
+}
+
 fn whole() -> f64 {
     1.0
 }
@@ -59,6 +89,7 @@ impl Step {
             | Step::Pretension { time_s }
             | Step::Hold { time_s }
             | Step::Shear { time_s, .. }
+            | Step::Stretch { time_s, .. }
             | Step::Move { time_s, .. } => time_s,
         }
     }
@@ -70,6 +101,7 @@ impl Step {
             | Step::Pretension { time_s }
             | Step::Hold { time_s }
             | Step::Shear { time_s, .. }
+            | Step::Stretch { time_s, .. }
             | Step::Move { time_s, .. } => time_s,
         }
     }
@@ -81,6 +113,7 @@ impl Step {
             Step::Pretension { .. } => "pretension",
             Step::Hold { .. } => "hold",
             Step::Shear { .. } => "shear",
+            Step::Stretch { .. } => "stretch",
             Step::Move { .. } => "move",
         }
     }
@@ -186,6 +219,9 @@ pub struct Output {
     /// Frames per load step besides. Default 0.
     #[schemars(range(min = 0, max = 10_000))]
     pub frames_per_step: usize,
+    /// Places whose displacement is written in every row, to `probes.csv`. Default none.
+    #[schemars(length(max = 1000))]
+    pub probes: Vec<Probe>,
     /// Whether pictures are rendered of the frames. Default true.
     pub pictures: bool,
     /// Seconds of wall time between two checkpoints, which `--resume` goes on from; there is one at the end of every load step
@@ -201,8 +237,34 @@ impl Default for Output {
             frames_at_deg: vec![25.0],
             frames_at_mm: Vec::new(),
             frames_per_step: 0,
+            probes: Vec::new(),
             pictures: true,
             checkpoint_wall_s: Some(300.0),
         }
     }
+}
+
+/// A place whose displacement is written in every row.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Probe {
+    /// Name of its columns.
+    #[schemars(length(min = 1, max = 100))]
+    pub name: String,
+    /// Where it is.
+    pub at: Place,
+}
+
+/// Where a probe is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// A node, by its number in the mesh (that of its point in `mesh.vtu`).
+    Node(#[schemars(range(min = 0, max = 1_000_000_000))] usize),
+    /// The first node of a thread, by its name.
+    FirstOf(String),
+    /// The last node of a thread, by its name.
+    LastOf(String),
+    /// The mean of all nodes whose reference position is in this box `[[x, y, z], [x, y, z]]`, mm.
+    Within(#[schemars(inner(inner(range(min = -1e6, max = 1e6))))] [[f64; 3]; 2]),
 }

@@ -32,10 +32,15 @@ pub fn trellis(angle: f64) -> [[f64; 2]; 2] {
     [[c, s], [s, c]]
 }
 
-/// dF̄/dγ of [`trellis`], per rad.
-pub fn trellis_rate(angle: f64) -> [[f64; 2]; 2] {
+/// F̄ of trellis shear with its fibre directions x and y stretched: their images have these lengths.
+pub fn gradient(angle: f64, stretch: [f64; 2]) -> [[f64; 2]; 2] {
+    trellis(angle).map(|row| [row[0] * stretch[0], row[1] * stretch[1]])
+}
+
+/// dF̄/dγ of [`gradient`] at constant stretches, per rad.
+pub fn gradient_rate(angle: f64, stretch: [f64; 2]) -> [[f64; 2]; 2] {
     let (s, c) = (0.5 * angle).sin_cos();
-    [[-0.5 * s, 0.5 * c], [0.5 * c, -0.5 * s]]
+    [[-0.5 * s * stretch[0], 0.5 * c * stretch[1]], [0.5 * c * stretch[0], -0.5 * s * stretch[1]]]
 }
 
 /// Shear angle of any in-plane gradient: 90° less the angle between the images of x and y.
@@ -45,10 +50,26 @@ pub fn angle_of([[a, b], [c, d]]: [[f64; 2]; 2]) -> f64 {
 
 /// Normalised shear force from virtual power, N/mm: `stress` is V P̄, the first Piola stress summed over the volume of the
 /// cell, N·mm (row: force direction); `area` is the reference area A₀, mm².
-pub fn normalised_force(stress: [[f64; 2]; 2], angle: f64, area: f64) -> f64 {
-    let rate = trellis_rate(angle);
+pub fn normalised_force(stress: [[f64; 2]; 2], angle: f64, stretch: [f64; 2], area: f64) -> f64 {
+    let rate = gradient_rate(angle, stretch);
     let power: f64 = stress.iter().flatten().zip(rate.iter().flatten()).map(|(p, f)| p * f).sum();
     power / (area * angle.cos())
+}
+
+/// Membrane forces along the fibre directions x and y, N per mm of reference width across them: the components of V P̄/A₀ that do
+/// work on their stretches.
+pub fn membrane_forces(stress: [[f64; 2]; 2], angle: f64, area: f64) -> [f64; 2] {
+    let image = trellis(angle);
+    [0, 1].map(|k| (stress[0][k] * image[0][k] + stress[1][k] * image[1][k]) / area)
+}
+
+/// Membrane force along both fibre directions of a cell that is sheared by pulling one corner while the two beside it are free,
+/// N/mm. No work is done where the free corners move, so the tractions on the two sides that meet in the pulled corner are equal;
+/// the balance of moments turns them into the diagonal. A traction p there does p cos(45° − γ/2) on the stretch of either
+/// direction and p sin(45° − γ/2) = F_nor cos γ on the shear angle, so the membrane force is F_nor (1 + sin γ). For negative
+/// angles the other diagonal is pulled.
+pub fn corner_force(normalised: f64, angle: f64) -> f64 {
+    normalised * 1.0_f64.copysign(angle) * (1.0 + angle.abs().sin())
 }
 
 /// Shear angle in a picture frame of side `side` after the machine has moved by `displacement` (Eq. 15 with 90° for the
@@ -176,7 +197,7 @@ mod tests {
             let f = trellis(angle);
             assert!((f[0][0].hypot(f[1][0]) - 1.0).abs() < 1e-15);
             assert!((angle_of(f) - angle).abs() < 1e-14);
-            let (high, low, rate) = (trellis(angle + 1e-5), trellis(angle - 1e-5), trellis_rate(angle));
+            let (high, low, rate) = (trellis(angle + 1e-5), trellis(angle - 1e-5), gradient_rate(angle, [1.0; 2]));
             for i in 0..2 {
                 for j in 0..2 {
                     assert!(((high[i][j] - low[i][j]) / 2e-5 - rate[i][j]).abs() < 1e-10);
@@ -196,7 +217,7 @@ mod tests {
             let g = area * k * angle * (angle.cos() * s - angle.sin() * c);
             let h = area * k * angle * (angle.cos() * c + angle.sin() * s);
             let stress = [[g, h], [h, g]];
-            let force = normalised_force(stress, angle, area);
+            let force = normalised_force(stress, angle, [1.0; 2], area);
             assert!((force - k * angle / angle.cos()).abs() < 1e-13);
             // The same energy in a frame: F_m = (dW/dγ)/(dd/dγ).
             let machine = area * k * angle / (side * (FRAC_PI_4 - 0.5 * angle).sin());

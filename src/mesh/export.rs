@@ -1,7 +1,11 @@
-//! Export to an Abaqus input file: geometry, element sets, orientations, sections and materials.
+//! Export to an Abaqus input file that CalculiX reads too: geometry, sets, orientations, sections and materials.
+//!
+//! Materials are linear about rest: engineering constants of the law at small strain, with the constants of the law itself in
+//! comments for who has it as a user material. A thread is a beam with a square section that has EA and EI of the thread: it is
+//! thinner than the envelope, whose radius a contact definition needs and a comment names. CalculiX has linear beams with no round one.
 
 use super::vector::{norm, sub};
-use super::{Block, Mesh, Seen, Thread};
+use super::{Block, Mesh, Ply, Seen, Thread};
 use crate::case::fabric::Material;
 use crate::error::{Error, Result};
 use std::collections::HashMap;
@@ -9,13 +13,16 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Writes a mesh as an Abaqus input file. Where a yarn or thread closes through the periodic cell, the far nodes are
-/// written as copies, so that every element has its true shape; the sets `PERIODIC_COPY` and `PERIODIC_ORIGINAL` list the
-/// copies and their originals in the same order.
-pub fn write_inp(mesh: &Mesh, path: &Path) -> Result<()> {
+/// A set of nodes by name.
+pub type NodeSet = (String, Vec<usize>);
+
+/// Writes a mesh as an Abaqus input file, with further node sets. Where a yarn or thread closes through the periodic cell, the far
+/// nodes are written as copies, so that every element has its true shape; for each direction the sets `PERIODIC_X_COPY` and
+/// `PERIODIC_X_ORIGINAL` list the copies and their originals in the same order (`Y` and `XY` likewise).
+pub fn write_inp(mesh: &Mesh, sets: &[NodeSet], path: &Path) -> Result<()> {
     let file = File::create(path).map_err(|e| Error::file(path, e))?;
     let mut out = BufWriter::new(file);
-    inp(mesh, &mut out).and_then(|()| out.flush()).map_err(|e| Error::file(path, e))
+    inp(mesh, sets, &mut out).and_then(|()| out.flush()).map_err(|e| Error::file(path, e))
 }
 
 /// Numbers of nodes in the file: originals first, then copies in the order in which elements ask for them.
@@ -39,7 +46,7 @@ impl Numbers {
 }
 
 /// Writes the text of the input file.
-pub fn inp(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
+pub fn inp(mesh: &Mesh, sets: &[NodeSet], out: &mut dyn Write) -> io::Result<()> {
     let mut numbers = Numbers { originals: mesh.nodes.len(), copies: Vec::new(), known: HashMap::new() };
     let mut elements = Vec::new();
     let mut next = 1;
@@ -50,30 +57,83 @@ pub fn inp(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
         beams(mesh, thread, &set("THREAD", i), &mut numbers, &mut next, &mut elements)?;
     }
     writeln!(out, "*HEADING\ntricot mesh; units mm, N, s, tonne, MPa")?;
-    writeln!(out, "*NODE")?;
+    writeln!(out, "*NODE, NSET=ALL_NODES")?;
     let originals = (0..mesh.nodes.len()).map(|node| Seen { node, image: [0, 0] });
     for (i, seen) in originals.chain(numbers.copies.iter().copied()).enumerate() {
         let [x, y, z] = mesh.position(seen);
         writeln!(out, "{}, {x:.9}, {y:.9}, {z:.9}", i + 1)?;
     }
     out.write_all(&elements)?;
-    if !numbers.copies.is_empty() {
-        let copies: Vec<usize> = (0..numbers.copies.len()).map(|i| mesh.nodes.len() + i + 1).collect();
-        let masters: Vec<usize> = numbers.copies.iter().map(|seen| seen.node + 1).collect();
-        for (name, nodes) in [("PERIODIC_COPY", copies), ("PERIODIC_ORIGINAL", masters)] {
-            writeln!(out, "*NSET, NSET={name}, UNSORTED")?;
-            for line in nodes.chunks(16) {
-                writeln!(out, "{}", line.iter().map(usize::to_string).collect::<Vec<_>>().join(", "))?;
-            }
-        }
+    element_groups(mesh, out)?;
+    let copies = || numbers.copies.iter().enumerate().map(|(i, seen)| (mesh.nodes.len() + i + 1, *seen));
+    for (name, is_there) in [("X", [true, false]), ("Y", [false, true]), ("XY", [true, true])] {
+        let own = || copies().filter(|(_, seen)| seen.image.map(|i| i != 0) == is_there);
+        node_set(out, &format!("PERIODIC_{name}_COPY"), own().map(|(number, _)| number))?;
+        node_set(out, &format!("PERIODIC_{name}_ORIGINAL"), own().map(|(_, seen)| seen.node + 1))?;
     }
+    for (name, nodes) in sets {
+        node_set(out, &label(name), nodes.iter().map(|node| node + 1))?;
+    }
+    node_set(out, "YARN_ENDS", yarn_ends(mesh).map(|node| node + 1))?;
+    node_set(out, "THREAD_ENDS", thread_ends(mesh).map(|node| node + 1))?;
+    let mut known = Vec::new();
     for (i, block) in mesh.blocks.iter().enumerate() {
-        solid_section(block, &set("BLOCK", i), out)?;
+        solid_section(mesh, i, block, &mut known, out)?;
     }
     for (i, thread) in mesh.threads.iter().enumerate() {
-        beam_section(mesh, thread, &set("THREAD", i), out)?;
+        beam_section(mesh, i, thread, &mut known, out)?;
     }
     Ok(())
+}
+
+/// A set of nodes, unless it is empty.
+fn node_set(out: &mut dyn Write, name: &str, nodes: impl Iterator<Item = usize>) -> io::Result<()> {
+    let numbers: Vec<String> = nodes.map(|n| n.to_string()).collect();
+    if !numbers.is_empty() {
+        writeln!(out, "*NSET, NSET={name}, UNSORTED")?;
+    }
+    numbers.chunks(16).try_for_each(|line| writeln!(out, "{}", line.join(", ")))
+}
+
+/// A name as decks have them.
+fn label(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_uppercase() } else { '_' }).collect()
+}
+
+/// Sets of the elements of both plies and of the stitch.
+fn element_groups(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
+    let of_ply = |ply: Ply| {
+        let own = mesh.blocks.iter().enumerate().filter(move |(_, block)| block.ply == ply);
+        own.map(|(i, _)| set("BLOCK", i)).collect::<Vec<_>>()
+    };
+    let threads = mesh.threads.iter().enumerate();
+    let stitch: Vec<String> = threads
+        .flat_map(|(i, thread)| {
+            slopes(mesh, thread).into_iter().map(move |(slope, _)| format!("{}_{slope}", set("THREAD", i)))
+        })
+        .collect();
+    for (name, members) in [("WARP", of_ply(Ply::Warp)), ("WEFT", of_ply(Ply::Weft)), ("STITCH", stitch)] {
+        if !members.is_empty() {
+            writeln!(out, "*ELSET, ELSET={name}")?;
+        }
+        members.chunks(8).try_for_each(|line| writeln!(out, "{}", line.join(", ")))?;
+    }
+    Ok(())
+}
+
+/// Nodes of the cut ends of yarns.
+fn yarn_ends(mesh: &Mesh) -> impl Iterator<Item = usize> + '_ {
+    let open = mesh.blocks.iter().filter(|block| block.wrap.is_none());
+    open.flat_map(|block| {
+        let grid = (0..=block.layers).flat_map(move |layer| (0..=block.columns).map(move |column| (column, layer)));
+        grid.flat_map(move |(column, layer)| [0, block.slices].map(|slice| block.node(slice, column, layer).node))
+    })
+}
+
+/// Nodes at the ends of threads.
+fn thread_ends(mesh: &Mesh) -> impl Iterator<Item = usize> + '_ {
+    let open = mesh.threads.iter().filter(|thread| thread.wrap.is_none());
+    open.flat_map(|thread| [thread.first, thread.first + thread.count - 1])
 }
 
 fn set(kind: &str, index: usize) -> String {
@@ -116,7 +176,8 @@ fn beams(
 ) -> io::Result<()> {
     writeln!(out, "** {}", thread.name)?;
     for (name, beams) in slopes(mesh, thread) {
-        writeln!(out, "*ELEMENT, TYPE=B31, ELSET={set}_{name}")?;
+        let kind = if thread.bending > 0.0 { "B31" } else { "T3D2" };
+        writeln!(out, "*ELEMENT, TYPE={kind}, ELSET={set}_{name}")?;
         for i in beams {
             let [a, b] = thread.beam(i).map(|n| numbers.of(n));
             writeln!(out, "{}, {a}, {b}", *next + i)?;
@@ -126,30 +187,65 @@ fn beams(
     Ok(())
 }
 
-fn solid_section(block: &Block, set: &str, out: &mut dyn Write) -> io::Result<()> {
+/// The section of a block, and its material unless another block has it already.
+fn solid_section(
+    mesh: &Mesh,
+    index: usize,
+    block: &Block,
+    known: &mut Vec<String>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
     let [a, b, c] = block.fibre;
     // Any second direction that is not along the fibre completes the orientation.
     let [d, e, f] = if c.abs() > 0.9 { [1.0, 0.0, 0.0] } else { [-b, a, 0.0] };
+    let set = set("BLOCK", index);
+    let own = |ply: Ply| mesh.blocks.iter().filter(move |other| other.ply == ply);
+    let same = own(block.ply).all(|other| other.material == block.material && other.density == block.density);
+    let material = match block.ply {
+        Ply::Warp if same => "WARP".to_owned(),
+        Ply::Weft if same => "WEFT".to_owned(),
+        _ => format!("MATERIAL_{set}"),
+    };
     writeln!(out, "** {}: local direction 1 is the fibre", block.name)?;
     writeln!(out, "*ORIENTATION, NAME=ORIENTATION_{set}\n{}", numbers(&[a, b, c, d, e, f]))?;
-    writeln!(out, "*SOLID SECTION, ELSET={set}, MATERIAL=MATERIAL_{set}, ORIENTATION=ORIENTATION_{set}")?;
-    writeln!(out, "*MATERIAL, NAME=MATERIAL_{set}\n*DENSITY\n{}", numbers(&[block.density]))?;
+    writeln!(out, "*SOLID SECTION, ELSET={set}, MATERIAL={material}, ORIENTATION=ORIENTATION_{set}")?;
+    if known.contains(&material) {
+        return Ok(());
+    }
+    writeln!(out, "*MATERIAL, NAME={material}")?;
+    known.push(material);
     match &block.material {
-        Material::Charmetant { k_elong_mpa, k_comp_mpa, p_comp, k_dist_mpa, k_sh_mpa, .. } => {
-            writeln!(out, "** K_elong, K_comp, p_comp, K_dist, K_sh of the hyperelastic law of Charmetant et al.")?;
-            writeln!(out, "*USER MATERIAL, CONSTANTS=5")?;
-            writeln!(out, "{}", numbers(&[*k_elong_mpa, *k_comp_mpa, *p_comp, *k_dist_mpa, *k_sh_mpa]))
+        Material::Charmetant { k_elong_mpa, k_comp_mpa, p_comp, k_dist_mpa, k_sh_mpa, compaction_cap } => {
+            let law = [*k_elong_mpa, *k_comp_mpa, *p_comp, *k_dist_mpa, *k_sh_mpa, *compaction_cap];
+            writeln!(out, "** at rest, of the hyperelastic law of Charmetant et al. with")?;
+            writeln!(out, "** K_elong, K_comp, p_comp, K_dist, K_sh, cap: {}", numbers(&law))?;
+            let constants = numbers(&at_rest(&law));
+            let (first, last) = constants.rsplit_once(", ").unwrap_or_default();
+            writeln!(out, "*ELASTIC, TYPE=ENGINEERING CONSTANTS\n{first},\n{last}")?;
         }
         Material::NeoHookean { young_mpa, poisson } => {
-            let shear = young_mpa / (2.0 * (1.0 + poisson));
-            let bulk = young_mpa / (3.0 * (1.0 - 2.0 * poisson));
             writeln!(
                 out,
-                "** the same moduli at small strain\n*HYPERELASTIC, NEO HOOKE\n{}",
-                numbers(&[shear / 2.0, 2.0 / bulk])
-            )
+                "** at rest, of a compressible neo-Hookean law\n*ELASTIC\n{}",
+                numbers(&[*young_mpa, *poisson])
+            )?;
         }
     }
+    writeln!(out, "*DENSITY\n{}", numbers(&[block.density]))
+}
+
+/// Engineering constants at rest of the law of Charmetant et al.: E₁, E₂, E₃, ν₁₂, ν₁₃, ν₂₃, G₁₂, G₁₃, G₂₃.
+///
+/// With small strains ε its invariants are I_elong = ε₁₁, I_comp = (ε₂₂ + ε₃₃)/2, I_sh² = γ₁₂² + γ₁₃² and I_dist² = ((ε₂₂ − ε₃₃)² +
+/// γ₂₃²)/4. Each energy is half a stiffness times its square; that of compaction is K p c^(p−2) below the cap c. Hence C₂₂ =
+/// (K_comp' + K_dist)/4 and C₂₃ = (K_comp' − K_dist)/4. Without a cap the law has no stiffness at rest, or an infinite one; 0.001
+/// stands for it then.
+fn at_rest(&[elongation, compaction, exponent, distortion, shear, cap]: &[f64; 6]) -> [f64; 9] {
+    let cap = if cap > 0.0 { cap } else { 1e-3 };
+    let compaction = compaction * exponent * cap.powf(exponent - 2.0);
+    let [own, other] = [0.25 * (compaction + distortion), 0.25 * (compaction - distortion)];
+    let young = (own * own - other * other) / own;
+    [elongation, young, young, 0.0, 0.0, other / own, shear, shear, 0.25 * distortion]
 }
 
 /// Numbers of a line. CalculiX reads no more than twenty characters of each.
@@ -161,20 +257,39 @@ fn numbers(numbers: &[f64]) -> String {
     numbers.iter().map(short).collect::<Vec<_>>().join(", ")
 }
 
-fn beam_section(mesh: &Mesh, thread: &Thread, set: &str, out: &mut dyn Write) -> io::Result<()> {
-    let area = std::f64::consts::PI * thread.radius * thread.radius;
-    let young = thread.axial / area;
-    let second = thread.bending / young;
-    writeln!(out, "** {}: EA = {} N, EI = {} N mm2", thread.name, thread.axial, thread.bending)?;
+/// The sections of a thread, and its material unless another thread has it already.
+fn beam_section(
+    mesh: &Mesh,
+    index: usize,
+    thread: &Thread,
+    known: &mut Vec<String>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    // EI = E a⁴/12 and EA = E a² give a² = 12 EI/EA
+    let side = (12.0 * thread.bending / thread.axial).sqrt();
+    let area = if side > 0.0 { side * side } else { std::f64::consts::PI * thread.radius * thread.radius };
+    let values = |t: &Thread| [t.radius, t.axial, t.bending, t.linear_density];
+    let same = mesh.threads.iter().all(|other| values(other) == values(thread));
+    let set = set("THREAD", index);
+    let material = if same { "STITCH".to_owned() } else { format!("MATERIAL_{set}") };
+    writeln!(
+        out,
+        "** {}: EA = {} N, EI = {} N mm2, envelope of radius {} mm",
+        thread.name, thread.axial, thread.bending, thread.radius
+    )?;
     for (name, _) in slopes(mesh, thread) {
-        let axis = if name == "FLAT" { "0, 0, -1" } else { "1, 0, 0" };
-        writeln!(
-            out,
-            "*BEAM GENERAL SECTION, SECTION=GENERAL, ELSET={set}_{name}, DENSITY={}",
-            numbers(&[thread.linear_density / area])
-        )?;
-        writeln!(out, "{}", numbers(&[area, second, 0.0, second, 2.0 * second]))?;
-        writeln!(out, "{axis}\n{}", numbers(&[young, young / 2.0]))?;
+        if thread.bending > 0.0 {
+            let axis = if name == "FLAT" { "0, 0, -1" } else { "1, 0, 0" };
+            writeln!(out, "*BEAM SECTION, SECTION=RECT, ELSET={set}_{name}, MATERIAL={material}")?;
+            writeln!(out, "{}\n{axis}", numbers(&[side, side]))?;
+        } else {
+            writeln!(out, "*SOLID SECTION, ELSET={set}_{name}, MATERIAL={material}\n{}", numbers(&[area]))?;
+        }
     }
-    Ok(())
+    if known.contains(&material) {
+        return Ok(());
+    }
+    writeln!(out, "*MATERIAL, NAME={material}\n*ELASTIC\n{}", numbers(&[thread.axial / area, 0.0]))?;
+    known.push(material);
+    writeln!(out, "*DENSITY\n{}", numbers(&[thread.linear_density / area]))
 }

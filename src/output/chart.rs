@@ -3,15 +3,27 @@
 use super::colour;
 use std::fmt::Write as _;
 
-/// A curve: its name and its points. Points that are not numbers interrupt it.
+/// A curve: its name and its points, and how far values spread to either side of each, if that is known. Points that are not
+/// numbers interrupt it.
 #[derive(Debug, Clone)]
 pub struct Curve<'a> {
     pub name: &'a str,
     pub points: Vec<[f64; 2]>,
+    pub spread: Vec<f64>,
+}
+
+impl Curve<'_> {
+    /// Points with a known spread: abscissa, and the ends of the band.
+    fn band(&self) -> Vec<[f64; 3]> {
+        let all = self.points.iter().zip(&self.spread).map(|([x, y], s)| [*x, y - s, y + s]);
+        all.filter(|ends| ends.iter().all(|v| v.is_finite())).collect()
+    }
 }
 
 const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 330.0;
+/// Height of a line of names.
+const LINE: f64 = 19.0;
 /// Left, top, right and bottom of the area of the curves.
 const AREA: [f64; 4] = [60.0, 32.0, 506.0, 276.0];
 /// Colours that stay apart for most eyes, and dashes that do in print.
@@ -21,22 +33,36 @@ const DASHES: [&str; 6] = ["none", "7 3", "2 3", "9 3 2 3", "4 2", "1 2"];
 /// Curves over an axis; `None` if there is no point to draw.
 pub fn curves(axis: [&str; 2], curves: &[Curve]) -> Option<String> {
     let finite = |p: &&[f64; 2]| p[0].is_finite() && p[1].is_finite();
-    let points = || curves.iter().flat_map(|c| &c.points).filter(finite);
+    let points = || curves.iter().flat_map(|c| &c.points).filter(finite).copied();
     points().next()?;
+    let bands: Vec<Vec<[f64; 3]>> = curves.iter().map(Curve::band).collect();
+    let ends = || bands.iter().flatten().flat_map(|[x, low, high]| [[*x, *low], [*x, *high]]);
     let range = |k: usize| {
-        let (low, high) = points().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
+        let (low, high) = points().chain(ends()).fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
         // a curve that stays on one side of zero is seen with it
         let (low, high) = (low.min(0.0), high.max(0.0));
         if high > low { (low, high) } else { (low, low + 1.0) }
     };
     let (xs, ys) = (ticks(range(0)), ticks(range(1)));
-    let ends = |t: &[f64]| (t[0], t[t.len() - 1]);
-    let (x_range, y_range) = (ends(&xs), ends(&ys));
-    let [left, top, right, bottom] = AREA;
+    let outer = |t: &[f64]| (t[0], t[t.len() - 1]);
+    let (x_range, y_range) = (outer(&xs), outer(&ys));
+    // names in as many lines as they need
+    let mut places = Vec::new();
+    let (mut pen, mut line) = (AREA[0], 0);
+    for curve in curves {
+        let width = 50.0 + 8.2 * curve.name.chars().count() as f64;
+        if pen + width > WIDTH && pen > AREA[0] {
+            (pen, line) = (AREA[0], line + 1);
+        }
+        places.push([pen, 16.0 + LINE * f64::from(line)]);
+        pen += width;
+    }
+    let down = LINE * f64::from(line);
+    let ([left, top, right, bottom], height) = ([AREA[0], AREA[1] + down, AREA[2], AREA[3] + down], HEIGHT + down);
     let x = |v: f64| left + (v - x_range.0) / (x_range.1 - x_range.0) * (right - left);
     let y = |v: f64| bottom - (v - y_range.0) / (y_range.1 - y_range.0) * (bottom - top);
     let mut t = format!(
-        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{} over {}\">",
+        "<svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{} over {}\">",
         escaped(axis[1]),
         escaped(axis[0])
     );
@@ -56,11 +82,18 @@ pub fn curves(axis: [&str; 2], curves: &[Curve]) -> Option<String> {
         t,
         "<text x=\"{:.1}\" y=\"{:.1}\" class=\"m\">{}</text>",
         0.5 * (left + right),
-        HEIGHT - 12.0,
+        height - 12.0,
         escaped(axis[0])
     );
-    let mut pen = left;
-    for (k, curve) in curves.iter().enumerate() {
+    for (k, (curve, [pen, high])) in curves.iter().zip(places).enumerate() {
+        if let Some((first, rest)) = bands[k].split_first() {
+            let mut edge = format!("M{:.1} {:.1}", x(first[0]), y(first[2]));
+            let back = bands[k].iter().rev().map(|p| (p[0], p[1]));
+            for (at, value) in rest.iter().map(|p| (p[0], p[2])).chain(back) {
+                let _ = write!(edge, "L{:.1} {:.1}", x(at), y(value));
+            }
+            let _ = write!(t, "<path fill=\"{}\" fill-opacity=\"0.15\" d=\"{edge}Z\"/>", COLOURS[k % 6]);
+        }
         let style = format!("stroke=\"{}\" stroke-dasharray=\"{}\"", COLOURS[k % 6], DASHES[k % 6]);
         let mut line = String::new();
         let mut down = false;
@@ -72,9 +105,8 @@ pub fn curves(axis: [&str; 2], curves: &[Curve]) -> Option<String> {
             down = draws;
         }
         let _ = write!(t, "<path class=\"c\" {style} d=\"{line}\"/>");
-        let _ = write!(t, "<path class=\"c\" {style} d=\"M{pen:.1} 16h26\"/>");
-        let _ = write!(t, "<text x=\"{:.1}\" y=\"20.5\">{}</text>", pen + 32.0, escaped(curve.name));
-        pen += 50.0 + 8.2 * curve.name.chars().count() as f64;
+        let _ = write!(t, "<path class=\"c\" {style} d=\"M{pen:.1} {high}h26\"/>");
+        let _ = write!(t, "<text x=\"{:.1}\" y=\"{:.1}\">{}</text>", pen + 32.0, high + 4.5, escaped(curve.name));
     }
     t.push_str("</svg>");
     Some(t)
@@ -130,17 +162,20 @@ pub fn map(name: &str, points: &[[f64; 3]], range: Option<[f64; 2]>) -> Option<S
 
 /// Five to ten round values that enclose a range, but for a tenth of a step at its low end.
 fn ticks((low, high): (f64, f64)) -> Vec<f64> {
-    let rough = (high - low) / 6.0;
-    let power = 10f64.powf(rough.log10().floor());
-    let step =
-        [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= rough * (1.0 - 1e-9)).unwrap_or(rough);
+    let step = round_step((high - low) / 6.0);
     let (first, last) = ((low / step + 0.1).floor() as i64, (high / step - 1e-9).ceil() as i64);
     (first..=last.max(first + 1)).map(|i| i as f64 * step).collect()
 }
 
+/// Smallest of 1, 2 and 5 times a power of ten that is not below a step.
+pub fn round_step(rough: f64) -> f64 {
+    let power = 10f64.powf(rough.log10().floor());
+    [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= rough * (1.0 - 1e-9)).unwrap_or(rough)
+}
+
 /// A tick with the digits that its neighbours need.
-fn label(value: f64, all: &[f64]) -> String {
-    let step = (all[1] - all[0]).abs();
+pub fn label(value: f64, all: &[f64]) -> String {
+    let step = (all[all.len().min(2) - 1] - all[0]).abs();
     let largest = all.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     if value == 0.0 {
         return "0".into();
@@ -173,11 +208,18 @@ mod tests {
     #[test]
     fn points_stand_where_they_belong_and_gaps_interrupt() {
         let points = vec![[0.0, 0.0], [5.0, f64::NAN], [10.0, 6.0], [20.0, 6.0]];
-        let svg = curves(["x", "y"], &[Curve { name: "a < b", points }]).unwrap();
+        let svg = curves(["x", "y"], &[Curve { name: "a < b", points, spread: Vec::new() }]).unwrap();
         let [left, _, right, bottom] = AREA;
         assert!(svg.contains(&format!("M{left:.1} {bottom:.1}M")) && svg.contains(&format!("L{right:.1} ")), "{svg}");
         assert!(svg.contains("a &lt; b"));
-        assert!(curves(["x", "y"], &[Curve { name: "a", points: vec![[f64::NAN, 1.0]] }]).is_none());
+        assert!(
+            curves(["x", "y"], &[Curve { name: "a", points: vec![[f64::NAN, 1.0]], spread: Vec::new() }]).is_none()
+        );
+        let wide = Curve { name: "a", points: vec![[0.0, 1.0], [1.0, 1.0]], spread: vec![0.5, f64::NAN] };
+        let svg = curves(["x", "y"], &vec![wide; 12]).unwrap();
+        assert_eq!(svg.matches("fill-opacity").count(), 12);
+        // 12 names of one letter take two lines, and the picture grows by the second
+        assert!(svg.contains("viewBox=\"0 0 520 349\"") && svg.contains(">1.5</text>"), "{svg}");
         assert!(map("γ", &[], None).is_none());
         let points = [[0.0, 0.0, 1.0], [1.0, 0.0, 2.0], [2.0, 0.0, 9.0]];
         assert_eq!(map("γ", &points, None).unwrap().matches("<circle").count(), 3);

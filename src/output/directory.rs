@@ -8,7 +8,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Files and folders that a run writes; pictures (`*.png`) and meshes (`*.vtu`, `*.inp`) come on top.
-const OWN: [&str; 18] = [
+const OWN: [&str; 21] = [
+    "run.log",
+    "reactions.csv",
+    "probes.csv",
     "contacts.csv",
     "yarns_each.csv",
     "stress.csv",
@@ -48,7 +51,7 @@ pub fn check(dir: &Path, force: bool) -> Result<()> {
     if !dir.is_dir() {
         return Err(in_the_way(dir));
     }
-    if force || list(dir)?.is_empty() {
+    if force || list(dir)?.iter().all(|path| is_half(path)) {
         return Ok(());
     }
     let message = "the folder is not empty: choose another one with -o, or give --force to move earlier results aside";
@@ -81,13 +84,13 @@ pub fn prepare(dir: &Path, force: bool) -> Result<Lock> {
 
 /// Removes what a stopped run left behind its checkpoint: half files, and frames and pictures from number `frames` on.
 pub fn tidy(dir: &Path, frames: usize) -> Result<()> {
-    for folder in ["", "frames", "state"].map(|name| dir.join(name)) {
+    for folder in ["", "frames", "state"].map(|name| dir.join(name)).into_iter().filter(|folder| folder.is_dir()) {
         for path in list(&folder)?.into_iter().filter(|path| path.is_file()) {
             let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
             let number = name.split_once('-').filter(|(n, _)| n.len() == 4).and_then(|(n, _)| n.parse::<usize>().ok());
             let later =
                 [".vtu", ".vtp", ".png"].iter().any(|end| name.ends_with(end)) && number.is_some_and(|n| n >= frames);
-            if later || name.ends_with(".part") {
+            if later || is_half(&path) {
                 fs::remove_file(&path).map_err(|e| Error::file(&path, reason(&e)))?;
             }
         }
@@ -100,6 +103,11 @@ fn list(dir: &Path) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(dir).map_err(fail)?;
     let paths = entries.map(|entry| entry.map(|e| e.path()).map_err(fail));
     paths.filter(|path| !path.as_ref().is_ok_and(|path| path.ends_with(lock::NAME))).collect()
+}
+
+/// Whether a file was being written when its run was killed.
+fn is_half(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "part")
 }
 
 fn is_own(path: &Path) -> bool {

@@ -2,6 +2,7 @@
 //!
 //! A periodic cell is tiled: the view shows [`CELLS`] cells in each direction, cut off square. A free scene is shown whole.
 
+use super::chart::{label, round_step};
 use super::colour::{self, Rgb};
 use super::image::Image;
 use super::raster::{Camera, Clip, draw};
@@ -24,8 +25,11 @@ const TITLE: f32 = 1.5;
 /// What to show.
 #[derive(Debug, Clone)]
 pub struct View {
-    /// Field that gives the colours, by its name on nodes, hexahedra or beams (vectors by their length); `None`: by ply.
+    /// Field that gives the colours, by its name on nodes, hexahedra or beams, and its component if it is a vector (`NAME.x`);
+    /// `None`: by ply.
     pub field: Option<String>,
+    /// Values at the ends of the colours; `None`: those of the frame.
+    pub range: Option<[f64; 2]>,
     /// Width of the picture, px.
     pub width_px: usize,
     /// Whether an oblique view stands below the two faces.
@@ -35,7 +39,7 @@ pub struct View {
 
 impl Default for View {
     fn default() -> Self {
-        Self { field: None, width_px: 1600, oblique: false, title: String::new() }
+        Self { field: None, range: None, width_px: 1600, oblique: false, title: String::new() }
     }
 }
 
@@ -45,7 +49,7 @@ pub fn render(mesh: &Mesh, frame: &Frame, view: &View) -> Result<Image> {
         let message = format!("a width of {} px; {} to {} can be drawn", view.width_px, WIDTHS.start(), WIDTHS.end());
         return Err(Error::case("picture", message));
     }
-    let scene = scene::build(mesh, frame, view.field.as_deref())?;
+    let scene = scene::build(mesh, frame, view.field.as_deref(), view.range)?;
     let Some(bounds) = Bounds::of(&scene) else {
         return Err(Error::geometry("picture", "the mesh has no surface to draw, or its positions are not finite"));
     };
@@ -253,7 +257,7 @@ impl Sheet {
         }
     }
 
-    /// The colour map with five values of the field.
+    /// The colour map with round values of the field.
     fn colour_bar(&self, image: &mut Image, name: &str, [low, high]: [f64; 2]) {
         let (size, top) = (self.letters, self.legend() + 0.1 * self.letters);
         self.line(image, self.margin, top, 1.0, name);
@@ -263,9 +267,10 @@ impl Sheet {
             let colour = colour::map((x as f32 + 0.5) / width);
             image.fill([left + x as f32, top + 0.15 * size, 1.0, 0.85 * size], colour);
         }
-        for k in 0..=4 {
-            let share = f64::from(k) / 4.0;
-            let label = tick(low + share * (high - low), high.abs().max(low.abs()));
+        let values = if high > low { ticks(low, high) } else { vec![low] };
+        for value in &values {
+            let label = label(*value, &values);
+            let share = if high > low { (value - low) / (high - low) } else { 0.5 };
             let at = left + share as f32 * width;
             let wide = text::width(&label, 0.85 * size);
             image.fill([(at - 0.5).clamp(left, left + width - 1.0), top + size, 1.0, 0.3 * size], colour::ink());
@@ -281,16 +286,12 @@ fn round_below(length: f32) -> f32 {
     [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|&v| v <= length).unwrap_or(power)
 }
 
-/// A value with three digits of the largest one beside it; what is smaller than its last digit is 0.
-fn tick(value: f64, largest: f64) -> String {
-    if value.abs() < 5e-4 * largest || value == 0.0 {
-        return "0".into();
-    }
-    if largest >= 1e5 || (largest < 1e-3 && largest > 0.0) {
-        return format!("{value:.2e}").replace('-', "−");
-    }
-    let whole = if largest > 0.0 { largest.log10().floor() as i32 } else { 0 };
-    format!("{value:.*}", (2 - whole).max(0) as usize).replace('-', "−")
+/// Two to seven round values within a range.
+fn ticks(low: f64, high: f64) -> Vec<f64> {
+    let step = round_step((high - low) / 6.0);
+    // an end that is a round value is one in spite of rounding
+    let (first, last) = ((low / step - 1e-6).ceil() as i64, (high / step + 1e-6).floor() as i64);
+    (first..=last).map(|i| i as f64 * step).collect()
 }
 
 #[cfg(test)]
@@ -335,7 +336,12 @@ mod tests {
     #[test]
     fn scale_bars_and_ticks_are_round() {
         assert_eq!([0.99_f32, 3.7, 5.0, 47.0].map(round_below), [0.5, 2.0, 5.0, 20.0]);
-        let ticks = [tick(0.25, 1.5), tick(-120.0, 480.0), tick(2.5e-6, 3e-6), tick(1e-10, 1.0)];
-        assert_eq!(ticks, ["0.25", "−120", "2.50e−6", "0"]);
+        assert_eq!(ticks(0.0, 5.0), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(ticks(-0.013, 0.11), [0.0, 0.05, 0.1]);
+        for (low, high) in [(3e-7, 9.1e-6), (-500.0, 20.0), (99.0, 101.0)] {
+            let values = ticks(low, high);
+            assert!((2..=7).contains(&values.len()), "{values:?}");
+            assert!(values[0] >= low && values[values.len() - 1] <= high, "{values:?}");
+        }
     }
 }

@@ -49,13 +49,22 @@ struct Paint<'a> {
     node: Option<&'a Field>,
     hex: Option<&'a Field>,
     beam: Option<&'a Field>,
+    /// Of a vector; `None` for its length.
+    component: Option<usize>,
     range: [f64; 2],
 }
 
+/// Components of a vector by name; behind them, its length.
+const COMPONENTS: [&str; 4] = ["x", "y", "z", "length"];
+
 impl Paint<'_> {
-    fn value(field: &Field, item: usize) -> f64 {
+    fn value(&self, field: &Field, item: usize) -> f64 {
         let values = &field.values[item * field.components..][..field.components];
-        if field.components == 1 { values[0] } else { values.iter().map(|v| v * v).sum::<f64>().sqrt() }
+        match self.component {
+            _ if field.components == 1 => values[0],
+            Some(component) => values[component],
+            None => values.iter().map(|v| v * v).sum::<f64>().sqrt(),
+        }
     }
 
     fn colour(&self, value: f64) -> Rgb {
@@ -65,9 +74,12 @@ impl Paint<'_> {
 }
 
 /// Surfaces of a frame, coloured by ply or by a field.
-pub fn build(mesh: &Mesh, frame: &Frame, field: Option<&str>) -> Result<Scene> {
+pub fn build(mesh: &Mesh, frame: &Frame, field: Option<&str>, range: Option<[f64; 2]>) -> Result<Scene> {
     frame.check(mesh)?;
-    let paint = field.map(|name| paint(frame, name)).transpose()?;
+    let mut paint = field.map(|name| paint(frame, name)).transpose()?;
+    if let (Some(paint), Some(range)) = (&mut paint, range) {
+        paint.range = range;
+    }
     let mut scene = Scene { legend: field.zip(paint.as_ref()).map(|(n, p)| (n.into(), p.range)), ..Scene::default() };
     let mut first = 0;
     for (index, block) in mesh.blocks.iter().enumerate() {
@@ -84,23 +96,36 @@ pub fn build(mesh: &Mesh, frame: &Frame, field: Option<&str>) -> Result<Scene> {
 
 /// The fields of this name, and their common range.
 fn paint<'a>(frame: &'a Frame, name: &str) -> Result<Paint<'a>> {
-    let find = |fields: &'a [Field]| fields.iter().find(|f| f.name == name);
-    let (node, hex, beam) = (find(&frame.node_fields), find(&frame.hex_fields), find(&frame.beam_fields));
+    let find = |fields: &'a [Field], name: &str| fields.iter().find(|f| f.name == name);
+    let all = [&frame.node_fields, &frame.hex_fields, &frame.beam_fields];
+    let (name, component) = match name.rsplit_once('.') {
+        Some((vector, end)) if COMPONENTS.contains(&end) => (vector, COMPONENTS.iter().position(|c| *c == end)),
+        _ => (name, None),
+    };
+    let [node, hex, beam] = all.map(|fields| find(fields, name));
     let found: Vec<&Field> = [node, hex, beam].into_iter().flatten().collect();
     if found.is_empty() {
-        let all = [&frame.node_fields, &frame.hex_fields, &frame.beam_fields];
         let mut names: Vec<&str> = all.into_iter().flatten().map(|f| f.name.as_str()).collect();
         names.sort_unstable();
         names.dedup();
         let names = if names.is_empty() { "none".to_string() } else { names.join(", ") };
         return Err(Error::case("picture", format!("no field is named {name:?}; available: {names}")));
     }
-    let values = found.iter().flat_map(|f| (0..f.values.len() / f.components).map(|i| Paint::value(f, i)));
+    let is_vector = found.iter().any(|field| field.components > 1);
+    if is_vector != component.is_some() {
+        let each = COMPONENTS.map(|component| format!("{name}.{component}")).join(", ");
+        let what = if is_vector { format!("is a vector: give one of {each}") } else { "has no components".into() };
+        return Err(Error::case("picture", format!("field {name:?} {what}")));
+    }
+    let mut paint = Paint { node, hex, beam, component: component.filter(|c| *c < 3), range: [0.0; 2] };
+    let values = found.iter().flat_map(|f| (0..f.values.len() / f.components).map(|i| paint.value(f, i)));
     let (low, high) = values
         .filter(|v| v.is_finite())
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-    let range = if low <= high { [low, high] } else { [0.0, 0.0] };
-    Ok(Paint { node, hex, beam, range })
+    if low <= high {
+        paint.range = [low, high];
+    }
+    Ok(paint)
 }
 
 /// Outer faces of a block; `(first, index)` are the number of its first hexahedron and its own.
@@ -159,10 +184,10 @@ fn surfaces(
                     if let Some(field) = paint.hex {
                         let [s, c, l] = place(i, j, at);
                         let (s, c, l) = (s.min(slices - 1), c.min(columns - 1), l.min(layers - 1));
-                        return paint.colour(Paint::value(field, first + (l * columns + c) * slices + s));
+                        return paint.colour(paint.value(field, first + (l * columns + c) * slices + s));
                     }
                     let [s, c, l] = place(a, b, at);
-                    paint.node.map_or(colour::plain(), |f| paint.colour(Paint::value(f, block.node(s, c, l).node)))
+                    paint.node.map_or(colour::plain(), |f| paint.colour(paint.value(f, block.node(s, c, l).node)))
                 });
                 quads.push(Quad {
                     corners: ends.map(|[a, b]| point(a, b)),
@@ -222,10 +247,10 @@ fn tube(quads: &mut Vec<Quad>, mesh: &Mesh, frame: &Frame, thread: &Thread, firs
         let colour = |end: usize| {
             let Some(paint) = paint else { return colour::thread() };
             if let Some(field) = paint.beam {
-                return paint.colour(Paint::value(field, first + beam));
+                return paint.colour(paint.value(field, first + beam));
             }
             let Some(field) = paint.node else { return colour::plain() };
-            let [a, b] = thread.beam(beam).map(|seen| Paint::value(field, seen.node));
+            let [a, b] = thread.beam(beam).map(|seen| paint.value(field, seen.node));
             paint.colour(a + (b - a) * (piece + end) as f64 / PIECES as f64)
         };
         for n in 0..SIDES {
@@ -301,7 +326,7 @@ mod tests {
     fn surfaces_are_closed_and_face_outward() {
         let mesh = sample::plies();
         let frame = sample::frame(&mesh, [[1.0, 0.0], [0.0, 1.0]]);
-        let scene = build(&mesh, &frame, None).unwrap();
+        let scene = build(&mesh, &frame, None, None).unwrap();
         let faces = |b: &Block| 2 * b.slices * (b.columns + b.layers);
         let wanted = mesh.blocks.iter().map(faces).sum::<usize>() + mesh.beams() * PIECES * SIDES;
         assert_eq!(scene.quads.len(), wanted);
@@ -323,8 +348,11 @@ mod tests {
         let mesh = sample::plies();
         let mut frame = sample::frame(&mesh, [[1.0, 0.0], [0.0, 1.0]]);
         frame.beam_fields.push(Field { name: "tension_n".into(), components: 1, values: vec![0.1; mesh.beams()] });
-        let message = build(&mesh, &frame, Some("tensoin")).unwrap_err().to_string();
+        let message = build(&mesh, &frame, Some("tensoin"), None).unwrap_err().to_string();
         assert!(message.contains("tensoin") && message.contains("tension_n"), "{message}");
-        assert_eq!(build(&mesh, &frame, Some("tension_n")).unwrap().legend, Some(("tension_n".into(), [0.1, 0.1])));
+        assert_eq!(
+            build(&mesh, &frame, Some("tension_n"), None).unwrap().legend,
+            Some(("tension_n".into(), [0.1, 0.1]))
+        );
     }
 }

@@ -42,6 +42,10 @@ pub const CONTACTS: &[&str] = &[
     "dt_limit_s",
 ];
 
+/// Columns of `reactions.csv`: force of each grip on the scene.
+pub const REACTIONS: &[&str] =
+    &["time_s", "displacement_mm", "condition", "force_x_n", "force_y_n", "force_z_n", "force_n"];
+
 /// Columns of `yarns_each.csv`: means over the stations of one yarn.
 pub const YARNS_EACH: &[&str] = &[
     "time_s",

@@ -109,7 +109,11 @@ impl Grid {
         let points: Vec<f64> = seen.iter().flat_map(|&s| frame.position(mesh, s)).collect();
         let reference = seen.iter().flat_map(|&s| mesh.position(s));
         let displacement = points.iter().zip(reference).map(|(x, r)| x - r);
-        let mut point_data = vec![Array::real("displacement_mm", 3, displacement)];
+        let mut radius = vec![0.0; mesh.nodes.len()];
+        mesh.threads.iter().for_each(|thread| radius[thread.first..][..thread.count].fill(thread.radius));
+        let radius = seen.iter().map(|s| radius[s.node]);
+        let mut point_data =
+            vec![Array::real("displacement_mm", 3, displacement), Array::real("thread_radius_mm", 1, radius)];
         for field in &frame.node_fields {
             let n = field.components;
             let values = seen.iter().flat_map(|s| field.values[n * s.node..][..n].iter().copied());

@@ -1,11 +1,22 @@
 //! Which nodes are prescribed, and by how much they move.
 
 use crate::case::Case;
-use crate::case::domain::{Clamps, Domain, InlineMesh, Specimen};
+use crate::case::domain::{Clamps, Condition, Domain, InlineMesh, Specimen};
 use crate::error::{Error, Result};
 use crate::fabric::specimen;
 use crate::mesh::Mesh;
 use std::collections::BTreeMap;
+
+/// Nodes that one condition of the case prescribes together.
+#[derive(Debug, Clone)]
+pub struct Grip {
+    pub name: String,
+    pub nodes: Vec<usize>,
+    /// Which components are prescribed.
+    pub components: [bool; 3],
+    /// Displacement at full amplitude, mm.
+    pub displacement: [f64; 3],
+}
 
 /// Tables of prescribed motion.
 #[derive(Default)]
@@ -24,11 +35,7 @@ impl Conditions {
     /// # Errors
     /// Names a condition that contradicts an earlier one.
     pub fn new(case: &Case, mesh: &Mesh) -> Result<Self> {
-        let by_node = match &case.domain {
-            Domain::Cell { .. } => BTreeMap::new(),
-            Domain::Specimen(specimen) => clamps(specimen, mesh),
-            Domain::Mesh(inline) => boxes(inline, mesh)?,
-        };
+        let by_node = by_node(&grips(case, mesh))?;
         let later = matches!(&case.domain, Domain::Specimen(s) if s.clamps == Clamps::AfterPretension);
         let mut held = vec![false; mesh.nodes.len()];
         for (node, _) in by_node.iter().filter(|(_, (mask, _))| *mask == 7 && !later) {
@@ -53,47 +60,67 @@ impl Conditions {
     }
 }
 
-/// Mask of components and displacement of each prescribed node.
-type ByNode = BTreeMap<usize, (u32, [f64; 3])>;
-
-/// Both clamps hold all components; the one at x > 0 moves.
-fn clamps(specimen: &Specimen, mesh: &Mesh) -> ByNode {
-    let [held, moved] = specimen::clamped(specimen, mesh);
-    let held = held.into_iter().map(|node| (node, (7, [0.0; 3])));
-    held.chain(moved.into_iter().map(|node| (node, (7, [specimen.displacement_mm, 0.0, 0.0])))).collect()
+/// The grips of a case, in the order in which it gives them.
+pub fn grips(case: &Case, mesh: &Mesh) -> Vec<Grip> {
+    match &case.domain {
+        Domain::Cell { .. } => Vec::new(),
+        Domain::Specimen(specimen) => clamps(specimen, mesh),
+        Domain::Mesh(inline) => boxes(inline, mesh),
+    }
 }
 
-/// Conditions of an inline mesh.
-fn boxes(inline: &InlineMesh, mesh: &Mesh) -> Result<ByNode> {
-    let mut by_node = ByNode::new();
-    for (number, condition) in inline.conditions.iter().enumerate() {
-        let blocks = mesh.blocks.iter().map(|b| (&b.name, b.first, b.count()));
-        let threads = mesh.threads.iter().map(|t| (&t.name, t.first, t.count));
-        for (name, first, count) in blocks.chain(threads) {
-            if condition.body.as_ref().is_some_and(|body| body != name) {
-                continue;
-            }
-            let [low, high] = condition.within;
-            let inside = |x: &[f64; 3]| (0..3).all(|k| x[k] >= low[k] - 1e-6 && x[k] <= high[k] + 1e-6);
-            for node in (first..first + count).filter(|n| inside(&mesh.nodes[*n])) {
-                let (mask, target) = by_node.entry(node).or_default();
-                for k in (0..3).filter(|k| condition.components[*k]) {
-                    let displacement = condition.displacement_mm[k];
-                    if *mask >> k & 1 == 1 && target[k] != displacement {
-                        return Err(Error::case(
-                            format!("domain.mesh.conditions.{number}"),
-                            format!(
-                                "prescribes {displacement} mm along {} at node {node}, which an earlier condition moves by {} mm; keep one of them",
-                                ["x", "y", "z"][k],
-                                target[k]
-                            ),
-                        ));
-                    }
-                    *mask |= 1 << k;
-                    target[k] = displacement;
+/// Mask of components and displacement of each prescribed node.
+fn by_node(grips: &[Grip]) -> Result<BTreeMap<usize, (u32, [f64; 3])>> {
+    let mut by_node = BTreeMap::<usize, (u32, [f64; 3])>::new();
+    for (number, grip) in grips.iter().enumerate() {
+        for &node in &grip.nodes {
+            let (mask, target) = by_node.entry(node).or_default();
+            for k in (0..3).filter(|k| grip.components[*k]) {
+                let displacement = grip.displacement[k];
+                if *mask >> k & 1 == 1 && target[k] != displacement {
+                    return Err(Error::case(
+                        format!("domain.mesh.conditions.{number}"),
+                        format!(
+                            "prescribes {displacement} mm along {} at node {node}, which an earlier condition moves by {} mm; keep one of them",
+                            ["x", "y", "z"][k],
+                            target[k]
+                        ),
+                    ));
                 }
+                *mask |= 1 << k;
+                target[k] = displacement;
             }
         }
     }
     Ok(by_node)
+}
+
+/// Both clamps hold all components; the one at x > 0 moves.
+fn clamps(specimen: &Specimen, mesh: &Mesh) -> Vec<Grip> {
+    let [held, moved] = specimen::clamped(specimen, mesh);
+    let clamp = |name: &str, nodes, way| Grip {
+        name: name.into(),
+        nodes,
+        components: [true; 3],
+        displacement: [way, 0.0, 0.0],
+    };
+    vec![clamp("held clamp", held, 0.0), clamp("moved clamp", moved, specimen.displacement_mm)]
+}
+
+/// Conditions of an inline mesh.
+fn boxes(inline: &InlineMesh, mesh: &Mesh) -> Vec<Grip> {
+    let grip = |(number, condition): (usize, &Condition)| {
+        let blocks = mesh.blocks.iter().map(|b| (&b.name, b.first, b.count()));
+        let threads = mesh.threads.iter().map(|t| (&t.name, t.first, t.count));
+        let own = blocks.chain(threads).filter(|(name, ..)| condition.body.as_ref().is_none_or(|body| body == *name));
+        let [low, high] = condition.within;
+        let inside = |x: &[f64; 3]| (0..3).all(|k| x[k] >= low[k] - 1e-6 && x[k] <= high[k] + 1e-6);
+        Grip {
+            name: condition.name.clone().unwrap_or_else(|| format!("condition {number}")),
+            nodes: own.flat_map(|(_, first, count)| first..first + count).filter(|n| inside(&mesh.nodes[*n])).collect(),
+            components: condition.components,
+            displacement: condition.displacement_mm,
+        }
+    };
+    inline.conditions.iter().enumerate().map(grip).collect()
 }

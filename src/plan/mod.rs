@@ -34,6 +34,7 @@ use crate::mesh::Mesh;
 use crate::mesh::centre::centred;
 use bytemuck::Pod;
 use conditions::Conditions;
+pub use conditions::{Grip, grips};
 use contact::ContactScene;
 pub use contact::FaceBuffers;
 pub use effects::Active;
@@ -41,6 +42,7 @@ use hexes::HexBuffers;
 use solids::Solids;
 use threads::Threads;
 use ties::Ties;
+pub use ties::tied;
 pub use totals::{Largest, Sums, Totals};
 
 /// A plan, and what the host must know to drive it and to understand what it computes.

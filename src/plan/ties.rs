@@ -74,6 +74,13 @@ impl Ties {
     }
 }
 
+/// Nodes of threads that a case ties to yarns.
+pub fn tied(case: &Case, mesh: &Mesh) -> Vec<usize> {
+    let ties = case.effects.contact.as_ref().map(|contact| Ties::new(case, mesh, contact));
+    let nodes = ties.map_or_else(Vec::new, |ties| ties.nodes);
+    nodes.chunks_exact(crate::contact::tie::NODES).map(|tie| tie[0] as usize).collect()
+}
+
 /// The first nodes of a run of neighbours along a thread, as far as the reach.
 fn within(mesh: &Mesh, run: &[usize]) -> Vec<usize> {
     let mut arc = 0.0;

@@ -1,8 +1,9 @@
 //! A look at a case before it is run: sizes, effects, expected time, and on request what each effect costs and the whole algorithm.
 
 use super::effects::{Effect, effects};
+use super::notes::notes;
 use super::turns::{Ratio, ratio, step_time, trial, wall};
-use super::{scene, simulation};
+use super::{probes, scene, simulation};
 use crate::case::read::Loaded;
 use crate::error::{Error, Result};
 use crate::simulate::{Make, Simulation};
@@ -16,6 +17,7 @@ const TURNS: usize = 7;
 /// defaults in use.
 pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
     let (mesh, friction) = scene(loaded)?;
+    probes::nodes(&loaded.case.output.probes, &mesh)?;
     let mut probe = Simulation::new(&loaded.case, friction, mesh, Make::default())?;
     let bytes: usize = probe.model.plan.buffers.iter().map(|b| 4 * b.len).sum();
     probe.advance(0.0, |_| false)?;
@@ -43,6 +45,9 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
         probe.mesh.nodes.len(),
         bytes as f64 / 1e6
     );
+    for note in notes(loaded) {
+        let _ = writeln!(t, "note       {note}");
+    }
     let _ = writeln!(t, "effects    {}", found.iter().map(|e| e.name).collect::<Vec<_>>().join(", "));
     let _ = write!(
         t,

@@ -29,9 +29,9 @@ impl Results<'_> {
         let rows: Vec<usize> = (0..phases.len().min(shear.len())).filter(|r| phases[*r] == "move").collect();
         let (Some(&first), Some(&last)) = (rows.first(), rows.last()) else { return Ok(Vec::new()) };
         let pull = Pull { before: first.saturating_sub(1), rows, last, shear };
-        let mut found = vec![pull.zones(), pull.lag()];
-        found.extend(["warp", "weft"].map(|ply| pull.widths(ply)));
-        found.extend(["warp", "weft"].map(|ply| pull.gaps(ply)));
+        let plies = ["warp", "weft"];
+        let sentences = [pull.zones(), pull.lag()].into_iter().chain(plies.map(|ply| pull.widths(ply)));
+        let mut found: Vec<String> = sentences.chain(plies.map(|ply| pull.gaps(ply))).flatten().collect();
         found.extend(self.edges()?);
         found.extend(self.stitches()?);
         Ok(found)
@@ -134,30 +134,33 @@ impl Pull {
         self.shear.numbers(name)
     }
 
-    fn zones(&self) -> String {
+    /// `None`, as of the others, where no crossing lies well inside a zone.
+    fn zones(&self) -> Option<String> {
         let at = |zone: &str| self.column(&format!("zone_{zone}_angle_deg"))[self.last];
         let [a, b, c] = ["a", "b", "c"].map(at);
         let way = self.column("displacement_mm")[self.last];
         let theory = self.column("theory_angle_deg")[self.last];
-        format!(
+        let known = [a, b, c, theory].iter().all(|angle| angle.is_finite());
+        known.then(|| format!(
             "Zones A / B / C have sheared by {a:.1} / {b:.1} / {c:.1}° at {way:.2} mm ({:.2} and {:.2} of C); without slip none, \
              half and all of {theory:.1}° (Eq. 18)",
             a / c,
             b / c
-        )
+        ))
     }
 
     /// The effective angle of zone C beside Eq. 18.
-    fn lag(&self) -> String {
+    fn lag(&self) -> Option<String> {
         let [effective, theory] = ["zone_c_angle_deg", "theory_angle_deg"].map(|name| self.column(name));
         let stated = STATED_DEG.iter().filter_map(|stated| {
             let row = self.rows.iter().find(|&&row| theory[row] >= *stated)?;
             Some(format!("{:.1} at {:.1}°", effective[*row], theory[*row]))
         });
-        format!("Effective angle in zone C where Eq. 18 has more: {}", stated.collect::<Vec<_>>().join(", "))
+        let stated: Vec<String> = stated.collect();
+        (!stated.is_empty()).then(|| format!("Effective angle in zone C where Eq. 18 has more: {}", stated.join(", ")))
     }
 
-    fn widths(&self, ply: &str) -> String {
+    fn widths(&self, ply: &str) -> Option<String> {
         let width = self.column(&format!("zone_c_{ply}_width_mm"));
         let mut narrowest = width[self.before];
         let mut rise = 0.0f64;
@@ -165,18 +168,22 @@ impl Pull {
             narrowest = narrowest.min(width[row]);
             rise = rise.max(width[row] - narrowest);
         }
-        format!(
+        let known = width[self.before].is_finite() && width[self.last].is_finite();
+        known.then(|| format!(
             "Width of the {ply} in zone C: {:.3} mm before, {:.3} mm at the end; no row is more than {rise:.3} mm above an earlier one",
             width[self.before], width[self.last]
-        )
+        ))
     }
 
-    fn gaps(&self, ply: &str) -> String {
+    fn gaps(&self, ply: &str) -> Option<String> {
         let (gap, angle) = (self.column(&format!("zone_c_{ply}_gap_mm")), self.column("zone_c_angle_deg"));
         let widest = self.rows.iter().copied().max_by(|&a, &b| gap[a].total_cmp(&gap[b])).unwrap_or(self.last);
-        format!(
-            "Gap of the {ply} in zone C: {:.3} mm before, largest {:.3} mm at {:.1}°, {:.3} mm at the end",
-            gap[self.before], gap[widest], angle[widest], gap[self.last]
-        )
+        let known = [gap[self.before], gap[widest], gap[self.last]].iter().all(|gap| gap.is_finite());
+        known.then(|| {
+            format!(
+                "Gap of the {ply} in zone C: {:.3} mm before, largest {:.3} mm at {:.1}°, {:.3} mm at the end",
+                gap[self.before], gap[widest], angle[widest], gap[self.last]
+            )
+        })
     }
 }

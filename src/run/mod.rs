@@ -6,8 +6,12 @@ mod crossings;
 mod devices;
 pub mod effects;
 mod findings;
+mod grips;
+mod log;
 mod mesh;
+mod notes;
 mod picture;
+mod probes;
 mod pulled;
 mod report;
 mod resume;
@@ -37,8 +41,11 @@ use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH
 use crate::output::{directory, file, vtu};
 use crate::simulate::{Make, Retries, Simulation};
 use crossings::Crossed;
-use indicatif::{ProgressBar, ProgressStyle};
+use grips::Grips;
+use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use log::Log;
 use picture::draw;
+use probes::Probes;
 use pulled::Pulled;
 use resume::Start;
 use rows::STRESS;
@@ -51,6 +58,9 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// The case in a folder of results, with every default written out.
 pub const CASE: &str = "case.json";
+
+/// The verdict of a run that has come to its end.
+const FINISHED: &str = "finished";
 
 /// What the command line says about a run, beyond the case.
 #[derive(Debug, Clone)]
@@ -95,10 +105,17 @@ pub fn make(precision: Precision, machine: Machine, threads: Option<usize>, adap
         Machine::Auto => precision == Precision::F32 && gpu::devices().first().is_some_and(|d| d.is_discrete),
     };
     let device = if wanted { Some(Device::open(adapter)?) } else { None };
+    if let Some(device) = device.as_ref().filter(|device| adapter.is_empty() && device.is_software()) {
+        let what = format!(
+            "the only adapter here is {device:?}, which computes on the CPU and is slower than --backend cpu; give its name with \
+             --adapter to use it all the same"
+        );
+        return Err(Error::Unsupported(what));
+    }
     Ok(Make { precision, threads: threads.unwrap_or(0), device, ..Make::default() })
 }
 
-/// What a run found, in ten lines.
+/// What a run found, in a dozen lines.
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// The user stopped the run; results so far are complete files.
@@ -176,17 +193,30 @@ fn drive(loaded: &Loaded, options: &Options, make: Make, watch: &mut dyn FnMut()
     let mut loaded = loaded.clone();
     loaded.case.integration.precision = make.precision;
     let mut simulation = simulation(&loaded, make)?;
+    probes::nodes(&loaded.case.output.probes, &simulation.mesh)?;
     let held = if options.resume && options.output.is_dir() { Some(Lock::take(&options.output)?) } else { None };
     let start = Start::of(&loaded.case, options, &mut simulation)?;
-    let _held = if matches!(start, Start::Resumed(..)) {
-        held
-    } else {
-        let held = directory::prepare(&options.output, options.force)?;
-        write_case(&loaded.case, &options.output)?;
-        Some(held)
+    let _held = match start {
+        Start::Finished => {
+            let text = format!("{} is finished already: nothing is left to do", options.output.display());
+            return Ok(Outcome { interrupted: false, text });
+        }
+        Start::Resumed(_) => held,
+        Start::Again => {
+            directory::tidy(&options.output, 0)?;
+            held
+        }
+        Start::New | Start::From(_) => {
+            drop(held);
+            let held = directory::prepare(&options.output, options.force)?;
+            write_case(&loaded.case, &options.output)?;
+            Some(held)
+        }
     };
-    let mut run = Run::new(&loaded, options, simulation, Arc::clone(&STOPPED))?;
+    let mut run = Run::new(&loaded, options, simulation, Arc::clone(&STOPPED), matches!(start, Start::Resumed(_)))?;
     run.take_up(start)?;
+    run.taken_up = (run.simulation.step(), run.wall());
+    run.log.add(&format!("step {}: {}", run.simulation.step(), std::env::args().collect::<Vec<_>>().join(" ")));
     let result = run.go(watch);
     run.finish(result)
 }
@@ -214,6 +244,8 @@ struct Run<'a> {
     yarns: Option<[Table; 2]>,
     stitches: Option<Table>,
     crossings: Option<Crossed>,
+    grips: Option<Grips>,
+    probes: Option<Probes>,
     /// Of a specimen.
     pulled: Option<Pulled>,
     frames: Vec<(f64, String)>,
@@ -222,6 +254,10 @@ struct Run<'a> {
     curve: Vec<(f64, f64)>,
     /// Shear angle (rad) and external work (mJ) of a cell at the last row.
     last_shear: [f64; 2],
+    /// Squares of the errors of the membrane forces along x and y, (N/mm)², summed over the rows of shear, and their number.
+    missed: [f64; 3],
+    /// Number of the last load step in which nothing was loaded, and the share of kinetic in all energy at its end.
+    rest: Option<(usize, f64)>,
     /// Mean width, thickness and gap of warp and weft before shear, mm.
     settled: Option<[[f64; 3]; 2]>,
     worst_balance: f64,
@@ -236,8 +272,11 @@ struct Run<'a> {
     /// Wall time of the runs that this one goes on from, s.
     wall_before: f64,
     started: Instant,
+    /// Step and wall time, s, at which this process took the run up.
+    taken_up: (u64, f64),
     began: SystemTime,
-    /// When a line about the progress was last printed.
+    /// Lines about the progress, and when the last one was written.
+    log: Log,
     told: Instant,
 }
 
@@ -261,7 +300,13 @@ fn places(marks: &[f64], ends: [f64; 2]) -> Vec<f64> {
 }
 
 impl<'a> Run<'a> {
-    fn new(loaded: &'a Loaded, options: &'a Options, simulation: Simulation, stopped: Arc<AtomicBool>) -> Result<Self> {
+    fn new(
+        loaded: &'a Loaded,
+        options: &'a Options,
+        simulation: Simulation,
+        stopped: Arc<AtomicBool>,
+        goes_on: bool,
+    ) -> Result<Self> {
         let dir = &options.output;
         let energies: Vec<&str> = ["time_s", "shear_angle_deg"]
             .into_iter()
@@ -274,7 +319,7 @@ impl<'a> Run<'a> {
         std::fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, e))?;
         let table = |name: &str, header: &[&str]| {
             let path = dir.join(name);
-            if options.resume { Table::open(&path, header.len()) } else { Table::create(&path, header) }
+            if goes_on { Table::open(&path, header.len()) } else { Table::create(&path, header) }
         };
         Ok(Self {
             loaded,
@@ -286,6 +331,8 @@ impl<'a> Run<'a> {
             yarns: if plies { Some([table("yarns.csv", YARNS)?, table("yarns_each.csv", YARNS_EACH)?]) } else { None },
             stitches: if threads { Some(table("stitches.csv", STITCHES)?) } else { None },
             crossings: Crossed::of(&loaded.case.domain, mesh, table)?,
+            grips: Grips::of(&simulation, table)?,
+            probes: Probes::of(&loaded.case.output.probes, mesh, table)?,
             pulled: match &loaded.case.domain {
                 Domain::Specimen(specimen) => Some(Pulled::of(specimen, &simulation)),
                 _ => None,
@@ -297,6 +344,8 @@ impl<'a> Run<'a> {
             pictures: Vec::new(),
             curve: Vec::new(),
             last_shear: [0.0; 2],
+            missed: [0.0; 3],
+            rest: None,
             settled: None,
             worst_balance: 0.0,
             worst_kinetic: None,
@@ -306,7 +355,9 @@ impl<'a> Run<'a> {
             due: None,
             wall_before: 0.0,
             started: Instant::now(),
+            taken_up: (0, 0.0),
             began: SystemTime::now(),
+            log: Log::of(dir),
             told: Instant::now(),
         })
     }
@@ -383,6 +434,11 @@ impl<'a> Run<'a> {
             if !matches!(step, Step::Shear { .. } | Step::Move { .. }) {
                 self.settle()?;
             }
+            if matches!(step, Step::Settle { .. } | Step::Hold { .. }) {
+                let e = self.simulation.energies();
+                let all = e.kinetic_total + e.internal() + e.contact;
+                self.rest = Some((number, if all > 0.0 { e.kinetic_total / all } else { 0.0 }));
+            }
             let name = format!("{}-{}", number + 1, phase.name);
             self.write_frame(&name)?;
             self.place = Place { phase: number + 1, ..Place::default() };
@@ -425,34 +481,42 @@ impl<'a> Run<'a> {
         if self.options.quiet {
             return ProgressBar::hidden();
         }
-        let style = ProgressStyle::with_template("{bar:24} {percent:>3}% {elapsed}/{duration} {msg}");
+        let style = ProgressStyle::with_template("{bar:24} {percent:>3}% {elapsed} {msg}");
         ProgressBar::new(1_000_000).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
     }
 
-    /// Shows how far the run is: on a bar, or without a terminal by a line a minute.
+    /// Shows how far the run is: on a bar, or without a terminal by a line a minute, which is in `run.log` in any case.
     fn tell(&mut self, bar: &ProgressBar, phase: &str) {
         const EVERY: Duration = Duration::from_secs(60);
         let s = &self.simulation;
         let e = s.energies();
         let done = s.time() / s.schedule.end();
         bar.set_position((done * 1e6) as u64);
+        // by steps of the present length: how fast the load moves differs from step to step
+        let steps = (s.schedule.end() - s.time()) / s.dt();
+        let each = (self.wall() - self.taken_up.1) / s.step().saturating_sub(self.taken_up.0).max(1) as f64;
+        let left = HumanDuration(Duration::from_secs_f64((steps * each).clamp(0.0, 1e8)));
         let load = s.load();
         let loaded = match s.mesh.period {
             Some(_) => format!("γ {:.1}°", load.angle.to_degrees()),
             None => format!("d {:.2} mm", s.displacement()),
         };
         let message = format!(
-            "{phase} {loaded} step {} dt {:.2e} s, internal {:.3e} mJ, kinetic {:.1e} mJ, balance {:+.2} %",
+            "{left} left: {phase} {loaded} step {} dt {:.2e} s, internal {:.3e} mJ, kinetic {:.1e} mJ, balance {:+.2} %",
             s.step(),
             s.dt(),
             e.internal(),
             e.kinetic,
             100.0 * s.health().balance
         );
-        if bar.is_hidden() && !self.options.quiet && self.told.elapsed() >= EVERY {
+        if self.told.elapsed() >= EVERY {
             self.told = Instant::now();
-            // a reader that has gone away does not stop a run
-            let _ = writeln!(std::io::stderr(), "{:.1} %, {:.0} s: {message}", 100.0 * done, self.wall());
+            let line = format!("{:.1} %, {:.0} s, {message}", 100.0 * done, self.wall());
+            self.log.add(&line);
+            if bar.is_hidden() && !self.options.quiet {
+                // a reader that has gone away does not stop a run
+                let _ = writeln!(std::io::stderr(), "{line}");
+            }
         }
         bar.set_message(message);
     }
@@ -474,7 +538,7 @@ impl<'a> Run<'a> {
         }
         if self.loaded.case.output.pictures {
             let file = format!("{:04}-{name}.png", self.frames.len() - 1);
-            draw(&s.mesh, &frame, &self.loaded.case.title, None, 1200, &dir.join(&file))?;
+            draw(&s.mesh, &frame, &self.loaded.case.title, 1200, &dir.join(&file))?;
             self.pictures.push(file);
         }
         Ok(())
@@ -489,9 +553,10 @@ impl<'a> Run<'a> {
         }
         let verdict = match &result {
             Ok(()) if interrupted => "interrupted".to_owned(),
-            Ok(()) => "finished".to_owned(),
+            Ok(()) => FINISHED.to_owned(),
             Err(error) => error.to_string(),
         };
+        self.log.add(&format!("step {}: {verdict}", self.simulation.step()));
         let written = self.write_summary(&verdict);
         // what stopped the run is the error to report, even if it keeps the summary from being written too
         result?;

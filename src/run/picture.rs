@@ -11,26 +11,41 @@ use crate::output::picture::{View, render};
 use crate::output::vtu_read;
 use std::path::{Path, PathBuf};
 
-/// Draws a frame (`.vtu`), or the last frame of the folder of a run or mesh, to a PNG.
+/// Draws a frame (`.vtu`), or one of the folder of a run or mesh, to a PNG: the one whose number or name is `frame`, or the last.
 ///
 /// # Errors
-/// Names the file that is missing or cannot be read, or the fields that could be drawn instead.
-pub fn picture(source: &Path, field: Option<&str>, width: usize, out: &Path) -> Result<String> {
-    let path = if source.is_dir() { last_frame(source)? } else { source.to_path_buf() };
+/// Names the file that is missing or cannot be read, or the frames and fields that could be drawn instead.
+pub fn picture(source: &Path, frame: Option<&str>, view: &View, out: &Path) -> Result<String> {
+    if !out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
+        return Err(Error::file(out, "pictures are written as PNG: give a name that ends with .png"));
+    }
+    if let Some([low, high]) = view.range
+        && !(low < high)
+    {
+        return Err(Error::case("--range", format!("{low},{high} is no range: give the lower end first")));
+    }
+    let path = if source.is_dir() {
+        frame_of(source, frame)?
+    } else if frame.is_some() {
+        return Err(Error::file(source, "is one frame already: give the folder of its run to choose with --frame"));
+    } else {
+        source.to_path_buf()
+    };
     if !path.is_file() {
         return Err(Error::file(path, "no such file: give the folder of a run, or one of its frames (.vtu)"));
     }
     let loaded = read(&case_of(&path)?, &[])?;
     let (mesh, _) = scene(&loaded)?;
     let frame = vtu_read::read(&path, &mesh)?;
-    draw(&mesh, &frame, &loaded.case.title, field, width, out)?;
-    Ok(format!("{} drawn as {}", path.display(), out.display()))
+    let replaced = if out.exists() { ", which is replaced" } else { "" };
+    render(&mesh, &frame, &View { title: loaded.case.title, ..view.clone() })?.write_png(out)?;
+    Ok(format!("{} drawn as {}{replaced}", path.display(), out.display()))
 }
 
-/// The last frame in the collection of a run, or the mesh of a folder that holds no run.
-fn last_frame(dir: &Path) -> Result<PathBuf> {
+/// A frame in the collection of a run, or the mesh of a folder that holds no run.
+fn frame_of(dir: &Path, wanted: Option<&str>) -> Result<PathBuf> {
     let (collection, mesh) = (dir.join("run.pvd"), dir.join("mesh.vtu"));
-    if !collection.exists() && mesh.exists() {
+    if !collection.exists() && mesh.exists() && wanted.is_none() {
         return Ok(mesh);
     }
     if !collection.exists() {
@@ -40,7 +55,19 @@ fn last_frame(dir: &Path) -> Result<PathBuf> {
         ));
     }
     let frames = vtu_read::read_collection(&collection)?;
-    frames.into_iter().last().ok_or_else(|| Error::file(&collection, "lists no frame yet"))
+    let Some(wanted) = wanted else {
+        return frames.into_iter().last().ok_or_else(|| Error::file(&collection, "lists no frame yet"));
+    };
+    // 0003-25deg
+    let name = |path: &Path| path.file_stem().map_or(String::new(), |name| name.to_string_lossy().into_owned());
+    let is_it = |path: &PathBuf| {
+        let name = name(path);
+        let (number, what) = name.split_once('-').unwrap_or((&name, ""));
+        what == wanted || name == wanted || number.parse::<usize>().is_ok_and(|n| wanted.parse() == Ok(n))
+    };
+    let names = || frames.iter().map(|path| name(path)).collect::<Vec<_>>().join(", ");
+    let found = frames.iter().find(|path| is_it(path)).cloned();
+    found.ok_or_else(|| Error::file(dir, format!("has no frame {wanted}; there are {}", names())))
 }
 
 /// The case of the run that a frame belongs to.
@@ -54,14 +81,7 @@ fn case_of(frame: &Path) -> Result<PathBuf> {
 }
 
 /// Renders a frame and writes the picture.
-pub(super) fn draw(
-    mesh: &Mesh,
-    frame: &Frame,
-    title: &str,
-    field: Option<&str>,
-    width: usize,
-    path: &Path,
-) -> Result<()> {
-    let view = View { field: field.map(str::to_owned), width_px: width, title: title.to_owned(), ..View::default() };
+pub(super) fn draw(mesh: &Mesh, frame: &Frame, title: &str, width: usize, path: &Path) -> Result<()> {
+    let view = View { width_px: width, title: title.to_owned(), ..View::default() };
     render(mesh, frame, &view)?.write_png(path)
 }

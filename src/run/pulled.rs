@@ -202,8 +202,16 @@ impl Pulled {
             [0, 1].map(|ply| format!("{} mm, before {}", sizes(&self.now, ply), sizes(&self.before, ply)));
         // writing to a String does not fail
         let _ = writeln!(t, "force      {forces}");
-        let _ =
-            writeln!(t, "zones      A / B / C sheared by {a:.2} / {b:.2} / {c:.2}° at {:.2} mm{theory}", self.last[0]);
+        let zones = [("A", a), ("B", b), ("C", c)].into_iter().filter(|(_, angle)| !angle.is_nan());
+        let zones: Vec<String> = zones.map(|(zone, angle)| format!("{zone} {angle:.2}°")).collect();
+        if zones.is_empty() {
+            let _ = writeln!(t, "zones      none: no crossing lies well inside one");
+        } else {
+            let _ = writeln!(t, "zones      sheared by {} at {:.2} mm{theory}", zones.join(", "), self.last[0]);
+        }
+        if c.is_nan() {
+            return t;
+        }
         let _ = writeln!(t, "zone C     width / gap of warp {warp}; of weft {weft}; slip {:.3} mm", self.now.slip);
         t
     }

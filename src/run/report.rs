@@ -1,8 +1,8 @@
 //! The results of a run on one page: what was run, warnings, sizes beside their targets, curves, maps and pictures. It is
 //! made from the files in the folder alone, so that a run that still goes on can be looked at too.
 
-use super::CASE;
-use super::summary::{PX35, TOMOGRAPHY};
+use super::{CASE, FINISHED};
+use crate::case::fabric::Measured;
 use crate::case::parse;
 use crate::error::{Error, Result};
 use crate::output::chart::{self, Curve};
@@ -136,7 +136,7 @@ impl Results<'_> {
 
     fn head(&self, page: &mut Page) {
         let verdict = self.summary["verdict"].as_str().unwrap_or("not finished: it still goes on, or was killed");
-        let class = if verdict == "finished" { "verdict" } else { "verdict bad" };
+        let class = if verdict == FINISHED { "verdict" } else { "verdict bad" };
         page.paragraph(class, verdict);
         let last = |column: &str| self.history.numbers(column).last().copied().unwrap_or(f64::NAN);
         let count = |name: &str| self.summary[name].as_u64().map_or_else(|| "–".into(), |n| n.to_string());
@@ -150,6 +150,7 @@ impl Results<'_> {
             ("kinetic over internal", format!("under {}", share(self.number("worst_kinetic_over_internal_in_shear")))),
             ("backend", self.summary["backend"].as_str().unwrap_or("–").into()),
             ("state", self.summary["state_hash"].as_str().unwrap_or("–").into()),
+            ("made by", self.provenance()),
         ];
         if self.summary.is_null() {
             facts.retain(|(name, _)| *name == "time");
@@ -162,12 +163,24 @@ impl Results<'_> {
         }
     }
 
+    /// Version and commit of the program, machine, and time.
+    fn provenance(&self) -> String {
+        let of = |name: &str| self.summary["program"][name].as_str();
+        let version = of("version").map_or("–".into(), |version| format!("tricot {version}"));
+        let commit = of("commit").map_or(String::new(), |commit| format!(" ({commit})"));
+        let place = of("host").map_or(String::new(), |host| format!(" on {host}"));
+        let time = of("ended").map_or(String::new(), |ended| format!(", {ended}"));
+        format!("{version}{commit}{place}{time}")
+    }
+
     /// What a reader should know before trusting the numbers.
     fn warnings(&self, verdict: &str) -> Vec<String> {
         let mut found = Vec::new();
-        if verdict != "finished" {
+        if verdict != FINISHED {
             found.push(format!("The run has not come to its end: {verdict}."));
         }
+        let notes = self.summary["notes"].as_array().into_iter().flatten().filter_map(Value::as_str);
+        found.extend(notes.map(|note| format!("{note}.")));
         let kinetic = self.number("worst_kinetic_over_internal_in_shear");
         if kinetic > KINETIC {
             found.push(format!(
@@ -214,23 +227,25 @@ impl Results<'_> {
         let loaded = phases.iter().position(|p| matches!(*p, "shear" | "move")).unwrap_or(phases.len());
         let last = yarns.len().min(phases.len()) - 1;
         let before = loaded.checked_sub(1).map(|row| row.min(last));
-        let known = self.case["fabric"]["name"].as_str().is_some_and(|name| name.contains(PX35));
-        let rows = ["warp", "weft"].into_iter().enumerate().flat_map(|(ply, name)| {
-            let yarns = &yarns;
+        let measured = |ply: &str| -> Option<Measured> {
+            serde_json::from_value(self.case["fabric"][ply]["measured"].clone()).ok().flatten()
+        };
+        let rows = ["warp", "weft"].into_iter().flat_map(|name| {
+            let (yarns, targets) = (&yarns, measured(name).map(|m| m.texts()));
             ["width", "thickness", "gap"].into_iter().enumerate().map(move |(k, size)| {
                 let values = yarns.numbers(&format!("{name}_{size}_mm"));
                 let spread = yarns.numbers(&format!("{name}_{size}_std_mm"));
                 let at =
                     |row: Option<usize>| row.map_or("–".into(), |r| format!("{:.3} ± {:.3}", values[r], spread[r]));
-                let target = if known { TOMOGRAPHY[ply][k] } else { "–" };
-                vec![format!("{name} {size}"), at(before), target.into(), at(Some(last))]
+                let target = targets.as_ref().map_or("–".into(), |targets| targets[k].clone());
+                vec![format!("{name} {size}"), at(before), target, at(Some(last))]
             })
         });
         page.heading("Sizes of yarns, mm");
-        page.table(&["", "tightened", "tomography", "at the end"], &rows.collect::<Vec<_>>());
-        let text = "Mean and standard deviation over all stations, across the yarn in its deformed mid-plane. Tomography is that of \
-                    the PX35 fabric as delivered.";
-        page.paragraph("soft", text);
+        page.table(&["", "tightened", "measured", "at the end"], &rows.collect::<Vec<_>>());
+        let by = measured("warp").map_or(String::new(), |m| format!(" Measured on the real fabric by {}.", m.by));
+        let text = "Mean and standard deviation over all stations, across the yarn in its deformed mid-plane.";
+        page.paragraph("soft", &format!("{text}{by}"));
         Ok(())
     }
 
@@ -250,7 +265,12 @@ impl Results<'_> {
                 ("underlap_tension_mean_n", "underlaps"),
                 ("tension_max_n", "largest"),
             ];
-            self.chart(page, &stitches, &OVER_TIME, ["Tension of the stitch", "N"], &tensions, "Weighted by length.");
+            let title = ["Tension of the stitch", "N"];
+            self.chart(page, &stitches, &OVER_TIME, title, &tensions, "Weighted by length.");
+            let axis = self.axis();
+            if axis.column != OVER_TIME.column {
+                self.chart(page, &stitches, &axis, title, &tensions, "Weighted by length, under load.");
+            }
             let slack = [("slack_share", "all"), ("loop_slack_share", "loops"), ("underlap_slack_share", "underlaps")];
             let caption = "Share of slack thread by length, below 0.02 N.";
             self.chart(page, &stitches, &OVER_TIME, ["Slack", "share"], &slack, caption);
@@ -274,8 +294,16 @@ impl Results<'_> {
         columns: &[(&str, &str)],
         caption: &str,
     ) {
-        let curves: Vec<Curve> =
-            columns.iter().map(|(column, name)| Curve { name, points: self.points(table, axis, column) }).collect();
+        let spread = |column: &str| {
+            let points = spread_of(column).map_or_else(Vec::new, |column| self.points(table, axis, &column));
+            points.iter().map(|p| p[1]).collect()
+        };
+        let curve = columns.iter().map(|(column, name)| Curve {
+            name,
+            points: self.points(table, axis, column),
+            spread: spread(column),
+        });
+        let curves: Vec<Curve> = curve.collect();
         if let Some(svg) = chart::curves([axis.label, unit], &curves) {
             page.figure(&format!("{title}, {unit}"), &svg, caption);
         }
@@ -288,8 +316,13 @@ impl Results<'_> {
             let force = [("f_nor_n_per_mm", "F_nor")];
             let caption = "External work per area and angle over cos γ, mean over each row.";
             self.chart(page, history, &axis, ["Shear force", "N/mm"], &force, caption);
+            if let Some(stress) = self.other("stress.csv")? {
+                let fibres = [("warp_membrane_n_per_mm", "warp"), ("weft_membrane_n_per_mm", "weft")];
+                let caption = "Along the fibres, per width of the fabric across them.";
+                self.chart(page, &stress, &axis, ["Membrane force", "N/mm"], &fibres, caption);
+            }
         } else {
-            let caption = "Size of the sum of the forces on prescribed nodes.";
+            let caption = "Of the grips on their largest displacement; each of them is in reactions.csv.";
             self.chart(page, history, &axis, ["Force", "N"], &[("force_n", "force")], caption);
         }
         if let Some(shear) = self.other("shear.csv")? {
@@ -322,7 +355,9 @@ impl Results<'_> {
         // an angle that falls back for a moment has no F_nor: the line goes on behind it
         let known = |p: &[f64; 2]| p[1].is_finite();
         let points = self.points(history, &OVER_EFFECTIVE, "f_nor_n_per_mm").into_iter().filter(known).collect();
-        if let Some(svg) = chart::curves([OVER_EFFECTIVE.label, "N/mm"], &[Curve { name: "F_nor", points }]) {
+        if let Some(svg) =
+            chart::curves([OVER_EFFECTIVE.label, "N/mm"], &[Curve { name: "F_nor", points, spread: Vec::new() }])
+        {
             let caption =
                 "Eq. 19 with the effective angle: it presumes zones sheared by nothing, half and all of that angle.";
             page.figure("Shear force, N/mm", &svg, caption);
@@ -479,6 +514,12 @@ fn middle(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     let last = values.len().checked_sub(1)?;
     let outer = (OUTER * last as f64) as usize;
     Some([values[outer], values[last - outer]])
+}
+
+/// Column of the standard deviation that belongs to that of a mean: `warp_gap_std_mm` to `warp_gap_mm`.
+fn spread_of(column: &str) -> Option<String> {
+    let (name, unit) = column.rsplit_once('_')?;
+    Some(format!("{}_std_{unit}", name.strip_suffix("_mean").unwrap_or(name)))
 }
 
 /// A number of a table with five digits.

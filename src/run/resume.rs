@@ -1,21 +1,27 @@
 //! Checkpoints of a run: when they are written, and how a run goes on from one.
 
-use super::{Options, Place, Run};
-use crate::case::Case;
+use super::{CASE, FINISHED, Options, Place, Run};
 use crate::case::steps::Step;
+use crate::case::{Case, parse};
 use crate::error::{Error, Guard, Result};
 use crate::kernel::record::{Record, Recorded};
 use crate::output::checkpoint::{self, Checkpoint};
+use crate::output::columns::Columns;
 use crate::output::directory;
 use crate::output::table::Table;
 use crate::simulate::Simulation;
 use serde_json::Value;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Where a run begins.
 pub(super) enum Start {
     /// At rest.
     New,
+    /// At rest, in a folder where this run was stopped before its first checkpoint.
+    Again,
+    /// Nowhere: this run is finished.
+    Finished,
     /// At the end of so many load steps of another run.
     From(usize),
     /// Where this run was when it wrote its last checkpoint: the record of the run.
@@ -27,11 +33,14 @@ impl Start {
     pub(super) fn of(case: &Case, options: &Options, simulation: &mut Simulation) -> Result<Self> {
         let path = match &options.from {
             Some(path) => path.clone(),
-            None if options.resume => checkpoint::latest(&options.output)?,
+            None if options.resume => match checkpoint::latest(&options.output)? {
+                Some(path) => path,
+                None => return without_checkpoint(case, &options.output),
+            },
             None => return Ok(Self::New),
         };
         let Checkpoint { header, records: [host, run], buffers } = Checkpoint::read(&path)?;
-        let here = checkpoint::through_text(&value(case)?);
+        let here = value(case)?;
         let phases = header.phases;
         let free = |place: &str| options.from.is_some() && may_differ(place, phases);
         if let Some(difference) = checkpoint::difference(&here, &header.case, &free) {
@@ -50,8 +59,39 @@ impl Start {
             }
             return Ok(Self::From(phases));
         }
-        Ok(Self::Resumed(run))
+        let is_complete = header.end_of_step && phases == case.steps.len();
+        Ok(if is_complete && verdict(&options.output)? == FINISHED { Self::Finished } else { Self::Resumed(run) })
     }
+}
+
+/// How a run begins that is to go on, but has no checkpoint.
+fn without_checkpoint(case: &Case, dir: &Path) -> Result<Start> {
+    let known = dir.join(CASE);
+    if !known.is_file() {
+        // whether there are files of others is seen when the folder is prepared
+        return Ok(Start::New);
+    }
+    let history = dir.join("history.csv");
+    let rows = if history.is_file() { Columns::read(&history)?.len() } else { 0 };
+    if rows > 0 {
+        let message =
+            "there is no checkpoint in state/, but there are rows: start anew with --force, which moves them aside";
+        return Err(Error::file(dir, message));
+    }
+    let there = parse::file(&known)?;
+    match checkpoint::difference(&value(case)?, &there, &|_| false) {
+        Some(difference) => Err(Error::file(&known, format!("belongs to another case: {difference}"))),
+        None => Ok(Start::Again),
+    }
+}
+
+/// What the summary of a folder says about the end of its run; nothing if there is none.
+fn verdict(dir: &Path) -> Result<String> {
+    let path = dir.join("summary.json");
+    if !path.is_file() {
+        return Ok(String::new());
+    }
+    Ok(parse::file(&path)?["verdict"].as_str().unwrap_or_default().to_owned())
 }
 
 /// Whether a place of a case may change between a run and another that starts from its state after `phases` load steps: names,
@@ -92,6 +132,8 @@ impl Run<'_> {
         }
         self.curve.record(record);
         self.last_shear.record(record);
+        self.missed.record(record);
+        self.rest.record(record);
         self.settled.record(record);
         self.worst_balance.record(record);
         self.worst_kinetic.record(record);
@@ -105,8 +147,12 @@ impl Run<'_> {
     fn tables(&mut self) -> Vec<&mut Table> {
         let tables = [&mut self.history, &mut self.energies, &mut self.contacts];
         let crossings = self.crossings.iter_mut().flat_map(|c| &mut c.tables);
+        let grips = self.grips.iter_mut().map(|grips| &mut grips.table);
+        let probes = self.probes.iter_mut().map(|probes| &mut probes.table);
         tables
             .into_iter()
+            .chain(grips)
+            .chain(probes)
             .chain(&mut self.stress)
             .chain(self.yarns.iter_mut().flatten())
             .chain(&mut self.stitches)
@@ -117,7 +163,7 @@ impl Run<'_> {
     /// Begins where `start` says: the simulation is there already, tables and frames follow.
     pub(super) fn take_up(&mut self, start: Start) -> Result<()> {
         match start {
-            Start::New => {}
+            Start::New | Start::Again | Start::Finished => {}
             Start::From(phases) => {
                 self.place.phase = phases;
                 self.last_shear = [self.simulation.load().angle, self.simulation.energies().external];
@@ -200,6 +246,7 @@ impl Run<'_> {
         let mut lengths = Vec::new();
         self.record(&mut lengths, &mut Record::read(own));
         self.wall_before = wall;
+        self.log.add(&format!("{said}; back to step {} with shorter steps", self.simulation.step()));
         self.bar().println(format!("{said}; back to step {} with shorter steps", self.simulation.step()));
         if self.loaded.case.output.checkpoint_wall_s.is_some() {
             self.write_state(lengths.clone(), None)?;

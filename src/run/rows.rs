@@ -9,8 +9,8 @@ use crate::mesh::Ply;
 
 /// Angle after which the kinetic energy of shear is judged, degrees.
 const SETTLED_DEG: f64 = 2.0;
-/// Components of V P̄/V₀ in `stress.csv`.
-pub(super) const STRESS: [&str; 11] = [
+/// Columns of `stress.csv`: components of V P̄/A₀, then stretches and membrane forces along the fibre directions x and y.
+pub(super) const STRESS: [&str; 15] = [
     "time_s",
     "shear_angle_deg",
     "p_xx_n_per_mm",
@@ -22,6 +22,10 @@ pub(super) const STRESS: [&str; 11] = [
     "p_zx_n_per_mm",
     "p_zy_n_per_mm",
     "p_zz_n_per_mm",
+    "weft_stretch",
+    "warp_stretch",
+    "weft_membrane_n_per_mm",
+    "warp_membrane_n_per_mm",
 ];
 
 /// Angle and forces of a row of the history.
@@ -41,7 +45,8 @@ impl Run<'_> {
     pub(super) fn write_row(&mut self, phase: &str) -> Result<()> {
         let (yarns, crossings) = self.see()?;
         let displacement = self.simulation.displacement();
-        let loading = self.loading(&crossings, displacement, phase);
+        let machine = self.grips.as_mut().map_or(Ok(0.0), |grips| grips.write(&self.simulation))?;
+        let loading = self.loading(&crossings, displacement, machine, phase);
         let Loading { degrees, theory, .. } = loading;
         self.simulation.alive()?;
         self.judge(phase);
@@ -51,6 +56,9 @@ impl Run<'_> {
             crossed.write_row([time, degrees, displacement], &crossings, theory)?;
         }
         self.write_yarns(time, degrees, &yarns)?;
+        if let Some(probes) = &mut self.probes {
+            probes.write(&self.simulation, degrees)?;
+        }
         if let Some(table) = &mut self.stitches {
             let tensions = self.simulation.tensions();
             self.simulation.alive()?;
@@ -85,7 +93,7 @@ impl Run<'_> {
     }
 
     /// Angle and forces, by the kind of scene.
-    fn loading(&mut self, crossings: &[Crossing], displacement: f64, phase: &str) -> Loading {
+    fn loading(&mut self, crossings: &[Crossing], displacement: f64, machine: f64, phase: &str) -> Loading {
         if let Some(pulled) = &mut self.pulled {
             let zones = self.crossings.as_ref().and_then(|c| c.means(crossings));
             let row = pulled.row(&self.simulation, displacement, zones, phase == "move");
@@ -93,9 +101,7 @@ impl Run<'_> {
             return Loading { degrees, theory, force: row.force, normalised: row.normalised };
         }
         let degrees = self.simulation.load().angle.to_degrees();
-        let sum = self.simulation.reactions().iter().fold([0.0; 3], |sum, f| [0, 1, 2].map(|k| sum[k] + f[k]));
-        let force = libm::sqrt(sum.iter().map(|f| f * f).sum());
-        Loading { degrees, theory: f64::NAN, force, normalised: f64::NAN }
+        Loading { degrees, theory: f64::NAN, force: machine, normalised: f64::NAN }
     }
 
     /// Keeps the worst of what a run is judged by.
@@ -123,13 +129,21 @@ impl Run<'_> {
         let time = self.simulation.time();
         if let Some(area) = self.simulation.mesh.period.map(|[x, y]| x * y) {
             let stress = self.simulation.take_stress().unwrap_or_default();
+            // a mean over the row belongs to its middle
+            let middle = 0.5 * (self.last_shear[0] + self.simulation.load().angle);
             normalised = self.cell_force(stress, area);
             if phase == "shear" {
                 self.curve.push((degrees, normalised));
+                for (sum, fibres) in self.missed.iter_mut().zip(self.simulation.fibres()) {
+                    *sum += fibres.error.map_or(0.0, |error| error * error);
+                }
+                self.missed[2] += 1.0;
             }
             if let Some(table) = &mut self.stress {
+                let stretches = self.simulation.stretch();
+                let membrane = shear::membrane_forces(in_plane(stress), middle, area);
                 let numbers = [time, degrees].into_iter().chain(stress.concat().into_iter().map(|p| p / area));
-                table.numbers(&numbers.collect::<Vec<_>>())?;
+                table.numbers(&numbers.chain(stretches).chain(membrane).collect::<Vec<_>>())?;
             }
         }
         let s = &self.simulation;
@@ -166,7 +180,7 @@ impl Run<'_> {
             // the mean over the row: ∫ A₀ F_nor cos γ dγ is the external work
             return (work - done) / (area * turned);
         }
-        shear::normalised_force([[stress[0][0], stress[0][1]], [stress[1][0], stress[1][1]]], angle, area)
+        shear::normalised_force(in_plane(stress), angle, self.simulation.stretch(), area)
     }
 
     /// Sizes by ply, and yarn by yarn.
@@ -193,4 +207,9 @@ impl Run<'_> {
         }
         Ok(())
     }
+}
+
+/// The components in the plane.
+fn in_plane(stress: [[f64; 3]; 3]) -> [[f64; 2]; 2] {
+    [0, 1].map(|i| [stress[i][0], stress[i][1]])
 }

@@ -1,18 +1,17 @@
-//! What a run says at its end: `summary.json` for programs, ten lines for a person.
+//! What a run says at its end: `summary.json` for programs, a dozen lines for a person.
 
 use super::Run;
+use super::notes::notes;
 use super::pulled::Pulled;
 use crate::error::Result;
 use crate::measure::stitches;
 use crate::output::{file, lock};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::time::SystemTime;
 
-/// Part of the name of the fabric whose sizes were measured by tomography; warp and weft, width, thickness and gap, mm.
-pub(super) const PX35: &str = "PX35";
-pub(super) const TOMOGRAPHY: [[&str; 3]; 2] =
-    [["4.59 ± 0.13", "0.38 ± 0.06", "0.39 ± 0.10"], ["2.08 ± 0.08", "0.38 ± 0.04", "0.40 ± 0.04"]];
+/// Share of kinetic in all energy below which a scene is at rest.
+const AT_REST: f64 = 0.01;
 
 impl Run<'_> {
     /// Writes `summary.json`.
@@ -26,6 +25,8 @@ impl Run<'_> {
             "verdict": verdict,
             "program": {
                 "version": env!("CARGO_PKG_VERSION"),
+                // builds that are given to others say where they come from
+                "commit": option_env!("TRICOT_COMMIT"),
                 "command": std::env::args().collect::<Vec<_>>().join(" "),
                 "host": lock::host(),
                 "started": humantime::format_rfc3339_seconds(self.began).to_string(),
@@ -55,6 +56,9 @@ impl Run<'_> {
             },
             "worst_energy_balance": self.worst_balance,
             "worst_kinetic_over_internal_in_shear": self.worst_kinetic,
+            "kinetic_share_at_rest": self.rest.map(|(_, share)| share),
+            "notes": notes(self.loaded),
+            "fibres": s.mesh.period.map(|_| self.fibres()),
             "specimen": self.pulled.as_ref().map(Pulled::summary),
             "energies_mj": e.columns().map(|(name, value)| (name.to_owned(), json!(value))).collect::<serde_json::Map<_, _>>(),
             "state_hash": hash,
@@ -63,6 +67,20 @@ impl Run<'_> {
         });
         let path = self.options.output.join("summary.json");
         file::replace(&path, |w| serde_json::to_writer_pretty(w, &summary).map_err(Into::into))
+    }
+
+    /// Stretch and membrane force along the fibres of a cell, by ply.
+    fn fibres(&self) -> Value {
+        let [weft, warp] = [0, 1].map(|k| {
+            let fibres = self.simulation.fibres()[k];
+            let missed = (self.missed[2] > 0.0).then(|| libm::sqrt(self.missed[k] / self.missed[2]));
+            json!({
+                "stretch": fibres.stretch,
+                "membrane_n_per_mm": fibres.force,
+                "error_in_shear_n_per_mm": fibres.error.and(missed),
+            })
+        });
+        json!({ "warp": warp, "weft": weft })
     }
 
     /// The lines a person wants to read.
@@ -133,7 +151,39 @@ impl Run<'_> {
                 (count > 0).then(|| format!("{:.4} at {angle}°", sum / f64::from(count)))
             };
             let forces: Vec<String> = [5.0, 15.0, 25.0, 35.0, 45.0].into_iter().filter_map(at).collect();
-            let _ = writeln!(t, "F_nor      {} N/mm (mean over ±1°)", forces.join(", "));
+            if !forces.is_empty() {
+                let _ = writeln!(t, "F_nor      {} N/mm (mean over ±1°)", forces.join(", "));
+            }
+        }
+        if s.mesh.period.is_some() {
+            let ([weft, warp], [x, y, rows]) = (s.fibres(), self.missed);
+            let missed = if rows > 0.0 && (weft.error.is_some() || warp.error.is_some()) {
+                format!("; off its aim by {:.4} / {:.4} (rms in shear)", libm::sqrt(y / rows), libm::sqrt(x / rows))
+            } else {
+                String::new()
+            };
+            let _ = writeln!(
+                t,
+                "fibres     warp / weft {:+.3} / {:+.3} % longer, membrane force {:.3} / {:.3} N/mm at the end{missed}",
+                100.0 * (warp.stretch - 1.0),
+                100.0 * (weft.stretch - 1.0),
+                warp.force,
+                weft.force
+            );
+        }
+        if let Some((number, share)) = self.rest {
+            let verdict = if share < AT_REST { "at rest" } else { "still moving: hold longer, or damp more" };
+            let _ = writeln!(
+                t,
+                "rest       {} after load step {} ({}): {:.2} % of the energy is kinetic",
+                verdict,
+                number + 1,
+                self.loaded.case.steps[number].name(),
+                100.0 * share
+            );
+        }
+        for note in notes(self.loaded) {
+            let _ = writeln!(t, "note       {note}");
         }
         let when = if self.pulled.is_some() { "while pulled" } else { "in shear" };
         let kinetic = self.worst_kinetic.map_or(String::new(), |worst| {
@@ -165,12 +215,13 @@ impl Run<'_> {
         t
     }
 
-    /// Sizes of yarns before shear, beside those of the real fabric where they are known.
+    /// Sizes of yarns before shear, beside those of the real fabric where they were measured.
     fn sizes(&self, t: &mut String) {
-        let known = self.loaded.fabric.as_ref().is_some_and(|fabric| fabric.name.contains(PX35));
-        let plies = ["warp", "weft"].into_iter().zip(TOMOGRAPHY);
-        for ((name, target), [width, thickness, gap]) in plies.zip(self.settled.into_iter().flatten()) {
-            let target = if known { format!(" (PX35 tomography {})", target.join(" / ")) } else { String::new() };
+        let fabric = self.loaded.fabric.as_ref();
+        let plies = [("warp", fabric.map(|f| &f.warp)), ("weft", fabric.map(|f| &f.weft))];
+        for ((name, yarn), [width, thickness, gap]) in plies.into_iter().zip(self.settled.into_iter().flatten()) {
+            let measured = yarn.and_then(|yarn| yarn.measured.as_ref());
+            let target = measured.map_or(String::new(), |m| format!(" ({} {})", m.by, m.texts().join(" / ")));
             // writing to a String does not fail
             let _ = writeln!(
                 t,

@@ -1,9 +1,10 @@
 //! The energy ledger: what is stored now, and what has been put in and lost since the start.
 
-use super::{Simulation, StressMean};
+use super::{Simulation, StressMean, WINDOW};
 use crate::contact::{status, sums};
 use crate::error::Result;
 use crate::kernel::stage::Stage;
+use crate::measure::shear::trellis;
 use crate::plan::Sums;
 
 /// Energies now, and work done since the start, in mJ (N·mm).
@@ -29,11 +30,13 @@ pub struct Energies {
     pub friction: f64,
     pub contact_damping: f64,
     pub damping: f64,
-    /// Work put in: by the thermal strain −∫N L₀ dε_th, by growing contact radii, by the macroscopic deformation ∫ V P̄ : dF̄,
-    /// by prescribed motion, by gravity, and by the added inertia of fibre lines and contact-aware mass.
+    /// Work put in: by the thermal strain −∫N L₀ dε_th, by growing contact radii, by the macroscopic deformation ∫ V P̄ : dF̄ in
+    /// shear and in the stretch of the fibre directions, by prescribed motion, by gravity, and by the added inertia of fibre lines
+    /// and contact-aware mass.
     pub thermal: f64,
     pub radius: f64,
     pub external: f64,
+    pub stretch: f64,
     pub prescribed: f64,
     pub gravity: f64,
     pub inertia: f64,
@@ -48,7 +51,7 @@ impl Energies {
 
     /// All work put in.
     pub fn input(&self) -> f64 {
-        self.thermal + self.radius + self.external + self.prescribed + self.gravity + self.inertia
+        self.thermal + self.radius + self.external + self.stretch + self.prescribed + self.gravity + self.inertia
     }
 
     /// All energy stored or lost.
@@ -76,6 +79,7 @@ impl Energies {
             ("thermal_work_mj", self.thermal),
             ("radius_work_mj", self.radius),
             ("external_work_mj", self.external),
+            ("stretch_work_mj", self.stretch),
             ("prescribed_work_mj", self.prescribed),
             ("gravity_work_mj", self.gravity),
             ("added_inertia_work_mj", self.inertia),
@@ -91,7 +95,7 @@ impl Simulation {
         let (Some(force), Some(stiffness)) = (b.contact_force, b.contact_stiffness) else { return Ok(0.0) };
         let contact = |stage: &&Stage| stage.writes.iter().any(|(buffer, _)| *buffer == force) && !stage.waits;
         let stages: Vec<Stage> = self.model.plan.step.iter().filter(contact).cloned().collect();
-        let row = self.schedule.row(self.time, 1e-12, 1e-12);
+        let row = self.row(self.time, 1e-12, 1e-12);
         self.backend.run(&stages, &[row]);
         let taken = |stage: &&Stage| {
             let faces = b.faces.iter().flatten().map(|faces| faces.sums);
@@ -117,7 +121,7 @@ impl Simulation {
         let results = [b.beam_tension, b.bend_energy];
         let threads = |stage: &&Stage| stage.writes.iter().any(|(buffer, _)| results.contains(&Some(*buffer)));
         let stages: Vec<Stage> = self.model.plan.step.iter().filter(threads).cloned().collect();
-        let row = self.schedule.row(self.time, self.dt, self.dt_before);
+        let row = self.row(self.time, self.dt, self.dt_before);
         self.backend.run(&stages, &[row]);
     }
 
@@ -162,19 +166,32 @@ impl Simulation {
             return;
         }
         let (places, virial) = (&self.model.totals, sums::virial(self.model.active.friction));
-        let old = self.schedule.row(from.max(0.0), 1.0, 1.0).gradient;
-        let new = self.schedule.row(to, 1.0, 1.0).gradient;
+        let total = |i: usize, j: usize| {
+            let elements: f64 = places.stress.iter().map(|sums| sums.of(totals, 3 * i + j)).sum();
+            let contact = places.contact.iter().map(|sums| sums.of(totals, virial + 3 * i + j));
+            elements + contact.sum::<f64>()
+        };
+        let sum = [0, 1, 2].map(|i| [0, 1, 2].map(|j| total(i, j)));
+        let mean = [0, 1].map(|i| [0, 1].map(|j| sum[i][j] / steps as f64));
+        // of the product of stretch and direction, what turns and what lengthens
+        let times = [from.max(0.0), to];
+        let ([old, new], [was, is]) =
+            (times.map(|t| trellis(self.schedule.load(t).angle)), times.map(|t| self.stretch.at(t)));
+        for i in 0..2 {
+            for j in 0..2 {
+                self.energies.external += mean[i][j] * 0.5 * (was[j] + is[j]) * (new[i][j] - old[i][j]);
+                self.energies.stretch += mean[i][j] * 0.5 * (new[i][j] + old[i][j]) * (is[j] - was[j]);
+            }
+        }
         for i in 0..3 {
             for j in 0..3 {
-                let component = 3 * i + j;
-                let elements: f64 = places.stress.iter().map(|sums| sums.of(totals, component)).sum();
-                let contact = places.contact.iter().map(|sums| sums.of(totals, virial + component));
-                let sum = elements + contact.sum::<f64>();
-                self.stress.sum[i][j] += sum;
-                self.energies.external += sum / steps as f64 * (new[i][j] - old[i][j]);
+                self.stress.sum[i][j] += sum[i][j];
             }
         }
         self.stress.steps += steps;
+        let middle = 0.5 * (from.max(0.0) + to);
+        let usual = WINDOW as f64 * self.dt;
+        self.stretch.see(mean, [middle, self.schedule.load(middle).angle], usual, self.area());
     }
 
     /// V P̄ averaged over the steps since the last call, N·mm; `None` if there was none.

@@ -94,7 +94,7 @@ impl Simulation {
                     .for_each(|k| free[condition[0] as usize + k * nodes] = false);
             }
         }
-        let row = self.schedule.row(self.time, self.dt, self.dt);
+        let row = self.row(self.time, self.dt, self.dt);
         let row = Row {
             rate: [[0.0; 3]; 3],
             thermal_increment: 0.0,

@@ -47,12 +47,14 @@ impl Recorded for Energies {
             thermal,
             radius,
             external,
+            stretch,
             prescribed,
             gravity,
             inertia,
         } = self;
         let stored = [elongation, compaction, distortion, shear, axial, bending, contact, kinetic, kinetic_total];
-        let flows = [friction, contact_damping, damping, thermal, radius, external, prescribed, gravity, inertia];
+        let flows =
+            [friction, contact_damping, damping, thermal, radius, external, stretch, prescribed, gravity, inertia];
         stored.into_iter().chain(flows).chain(hourglass).for_each(|x| x.record(record));
     }
 }
@@ -100,6 +102,8 @@ impl Simulation {
         let counts = [&mut self.step, &mut self.searches, &mut self.searched, &mut self.diagnosed, &mut self.burst];
         counts.into_iter().for_each(|x| x.record(record));
         self.gradient_at_search.record(record);
+        self.stretch_at_search.record(record);
+        self.stretch.record(record);
         self.energies.record(record);
         self.health.record(record);
         self.stress.record(record);

@@ -72,7 +72,7 @@ impl Simulation {
 
     /// The deformed state, with the fields that pictures and ParaView show.
     pub fn frame(&self) -> Frame {
-        let gradient = self.schedule.row(self.time, 1.0, 1.0).gradient;
+        let gradient = self.row(self.time, 1.0, 1.0).gradient;
         let f = [[1.0 + gradient[0][0], gradient[0][1]], [gradient[1][0], 1.0 + gradient[1][1]]];
         let positions = self
             .mesh

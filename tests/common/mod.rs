@@ -70,11 +70,11 @@ pub fn coarse_cell() -> Value {
     })
 }
 
-/// The coarse cell with a hold, frames and frequent checkpoints: a run of a second.
+/// The coarse cell with driven fibres, frames and frequent checkpoints: a run of a second.
 pub fn short_cell() -> Value {
     let steps = json!([
         { "pretension": { "time_s": 1.5e-4 } },
-        { "hold": { "time_s": 2e-5 } },
+        { "stretch": { "warp": "corner_driven", "weft": "corner_driven", "time_s": 2e-5 } },
         { "shear": { "angle_deg": 3, "time_s": 1e-4 } }
     ]);
     let output = json!({ "rows_per_step": 6, "frames_at_deg": [1, 2], "pictures": false, "checkpoint_wall_s": 0.02 });

@@ -55,7 +55,7 @@ pub fn contents(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 
 /// Everything that does not speak of wall time: names and bytes.
 fn results(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let timed = |path: &Path| path.starts_with("state") || path == Path::new("summary.json");
+    let timed = |path: &Path| path.starts_with("state") || ["summary.json", "run.log"].map(Path::new).contains(&path);
     let files = contents(dir).into_iter().map(|(path, bytes)| (path.strip_prefix(dir).unwrap().to_path_buf(), bytes));
     files.filter(|(path, _)| !timed(path)).collect()
 }

@@ -35,6 +35,9 @@ pub struct Listed {
     pub has_timestamps: bool,
 }
 
+/// Kind of an adapter that computes on the CPU.
+const SOFTWARE: &str = "software";
+
 /// An open device.
 pub struct Device {
     pub(super) device: wgpu::Device,
@@ -90,7 +93,7 @@ fn list(adapter: &wgpu::Adapter) -> Listed {
             wgpu::DeviceType::DiscreteGpu => "discrete GPU",
             wgpu::DeviceType::IntegratedGpu => "integrated GPU",
             wgpu::DeviceType::VirtualGpu => "virtual GPU",
-            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::Cpu => SOFTWARE,
             wgpu::DeviceType::Other => "other",
         },
         is_discrete: info.device_type == wgpu::DeviceType::DiscreteGpu,
@@ -117,6 +120,11 @@ fn line(message: &str) -> String {
 }
 
 impl Device {
+    /// Whether it computes on the CPU.
+    pub fn is_software(&self) -> bool {
+        self.listed.kind == SOFTWARE
+    }
+
     /// Opens the first adapter whose name contains `name` (any if empty; hardware before software).
     ///
     /// # Errors

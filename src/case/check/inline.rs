@@ -1,6 +1,6 @@
 //! A mesh written out in the case: sizes, shapes, names, and what the conditions catch.
 
-use super::{MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM};
+use super::{MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM, distinct};
 use crate::case::Case;
 use crate::case::domain::{Condition, InlineBlock, InlineMesh, InlineThread};
 use crate::case::origin::Origin;
@@ -45,16 +45,11 @@ pub fn check(case: &Case, mesh: &InlineMesh, origin: &Origin) -> Result<()> {
 fn names(mesh: &InlineMesh, origin: &Origin) -> Result<()> {
     let blocks = mesh.blocks.iter().enumerate().map(|(i, b)| (format!("domain.mesh.blocks.{i}.name"), &b.name));
     let threads = mesh.threads.iter().enumerate().map(|(i, t)| (format!("domain.mesh.threads.{i}.name"), &t.name));
-    let mut known = std::collections::BTreeMap::new();
-    for (path, name) in blocks.chain(threads) {
-        if name.chars().any(char::is_control) {
-            return Err(origin.error(&path, "holds a line break or control character, write one line"));
-        }
-        if let Some(first) = known.insert(name, path.clone()) {
-            return Err(origin.error(&path, format!("\"{name}\" is the name of {first} too, give each body its own")));
-        }
-    }
-    Ok(())
+    distinct(blocks.chain(threads), "body", origin)?;
+    let conditions = mesh.conditions.iter().enumerate();
+    let conditions =
+        conditions.filter_map(|(i, c)| Some((format!("domain.mesh.conditions.{i}.name"), c.name.as_ref()?)));
+    distinct(conditions, "condition", origin)
 }
 
 fn block(block: &InlineBlock, path: &str, origin: &Origin) -> Result<()> {

@@ -9,7 +9,7 @@ use crate::case::parse;
 use crate::case::read::{Loaded, read};
 use crate::case::steps::{Precision, Step};
 use crate::error::{Error, Result};
-use crate::output::checkpoint::{FOLDER, through_text};
+use crate::output::checkpoint::FOLDER;
 use crate::output::file;
 use crate::run::{self, CASE, Machine};
 use serde::{Deserialize, Serialize};
@@ -257,7 +257,7 @@ fn found(folder: &Path, loaded: &Loaded) -> Result<Option<Ran>> {
     if !ran.is_file() || !case.is_file() {
         return Ok(None);
     }
-    let same = differences(&through_text(&value(loaded)?), &parse::file(&case)?, &|_| false).is_empty();
+    let same = differences(&value(loaded)?, &parse::file(&case)?, &|_| false).is_empty();
     let ran: Option<Ran> = serde_json::from_value(parse::file(&ran)?).ok();
     Ok(ran.filter(|_| same))
 }

@@ -1,0 +1,78 @@
+//! Forces of grips in every row: `reactions.csv`, and the force of the machine of a scene with conditions.
+
+use crate::error::Result;
+use crate::output::table::{Cell, REACTIONS, Table};
+use crate::plan::{Grip, grips};
+use crate::simulate::Simulation;
+
+/// The grips of a scene.
+pub(super) struct Grips {
+    grips: Vec<Grip>,
+    /// Prescribed nodes of each grip, by their place in the list of reactions, with the components that count as its own: what two
+    /// grips prescribe belongs to the first.
+    own: Vec<Vec<(usize, [bool; 3])>>,
+    pub(super) table: Table,
+}
+
+impl Grips {
+    /// Those of a simulation; `None` if nothing is prescribed.
+    pub(super) fn of(simulation: &Simulation, table: impl Fn(&str, &[&str]) -> Result<Table>) -> Result<Option<Self>> {
+        let grips = grips(simulation.case(), &simulation.mesh);
+        if grips.is_empty() {
+            return Ok(None);
+        }
+        let nodes = simulation.prescribed_nodes();
+        let mut taken = vec![[false; 3]; nodes.len()];
+        let own = grips.iter().map(|grip| {
+            let mut own = Vec::new();
+            for place in grip.nodes.iter().filter_map(|node| nodes.binary_search(node).ok()) {
+                let counts = [0, 1, 2].map(|k| grip.components[k] && !taken[place][k]);
+                (0..3).for_each(|k| taken[place][k] |= counts[k]);
+                own.push((place, counts));
+            }
+            own
+        });
+        let own = own.collect();
+        Ok(Some(Self { grips, own, table: table("reactions.csv", REACTIONS)? }))
+    }
+
+    /// Force of each grip on the scene, N: what balances the forces of the scene on its prescribed components.
+    fn forces(&self, reactions: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let sum = |own: &Vec<(usize, [bool; 3])>| {
+            let mut sum = [0.0; 3];
+            for (place, counts) in own {
+                (0..3).filter(|k| counts[*k]).for_each(|k| sum[k] -= reactions[*place][k]);
+            }
+            sum
+        };
+        self.own.iter().map(sum).collect()
+    }
+
+    /// A row for each grip. Returns the force of the machine, N: the one that does the work of all grips on the largest displacement
+    /// among them, or where none moves, the size of what they all hold.
+    pub(super) fn write(&mut self, simulation: &Simulation) -> Result<f64> {
+        let reactions = simulation.reactions();
+        simulation.alive()?;
+        let forces = self.forces(&reactions);
+        for (grip, force) in self.grips.iter().zip(&forces) {
+            let head = [simulation.time(), simulation.displacement()].map(Cell::from);
+            let numbers = [force[0], force[1], force[2], size(*force)].map(Cell::from);
+            let cells = head.into_iter().chain([grip.name.as_str().into()]).chain(numbers);
+            self.table.row(&cells.collect::<Vec<_>>())?;
+        }
+        let reach = self.grips.iter().map(|grip| size(grip.displacement)).fold(0.0, f64::max);
+        if reach > 0.0 {
+            let power = self
+                .grips
+                .iter()
+                .zip(&forces)
+                .flat_map(|(grip, force)| (0..3).map(|k| force[k] * grip.displacement[k]));
+            return Ok(power.sum::<f64>() / reach);
+        }
+        Ok(size(forces.iter().fold([0.0; 3], |sum, force| [0, 1, 2].map(|k| sum[k] + force[k]))))
+    }
+}
+
+fn size(force: [f64; 3]) -> f64 {
+    libm::sqrt(force.iter().map(|f| f * f).sum())
+}
