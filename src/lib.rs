@@ -2,7 +2,8 @@
 //!
 //! # What is solved
 //! Yarns are hexahedra of a fibre-bundle law, stitching threads are chains of beams, and everything may touch everything.
-//! In a periodic cell the deformation gradient F̄(t) of the fabric is prescribed, and the unknown is the fluctuation w:
+//! In a periodic cell the deformation gradient F̄(t) of the fabric is prescribed, but for the stretches of its two fibre directions
+//! where they follow a membrane force, and the unknown is the fluctuation w:
 //!
 //! ```text
 //! x = F̄ X + w,   w periodic                                positions (w = displacement in a free scene, F̄ = I)

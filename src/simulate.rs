@@ -25,6 +25,7 @@ use crate::case::Case;
 use crate::case::domain::{Clamps, Domain};
 use crate::case::steps::Precision;
 use crate::contact::found;
+use crate::contact::penalty::GAPS;
 use crate::contact::status;
 use crate::contact::threads::MOST_PAIRS;
 use crate::contact::travel::{SKIN_APART, SKIN_USED};
@@ -118,6 +119,8 @@ pub struct Simulation {
     start_energy: f64,
     largest_flow: f64,
     health: Health,
+    /// Step since which the energy balance is off by more than half of its tolerance.
+    half_off: Option<u64>,
     stress: StressMean,
     /// Half of the work of its motion, which the next look adds, mJ: see [`ledger`].
     owed: [f64; 4],
@@ -229,6 +232,7 @@ impl Simulation {
             start_energy: 0.0,
             largest_flow: 0.0,
             health: Health::default(),
+            half_off: None,
             stress: StressMean::default(),
             owed: [0.0; 4],
             ready: false,
@@ -518,7 +522,7 @@ impl Simulation {
         let mut backend = self.make.backend(&model)?;
         // found again
         let b = &self.model.buffers;
-        let lists: Vec<_> = b.faces.iter().flatten().flat_map(|faces| [Some(faces.near), Some(faces.gaps)]).collect();
+        let lists: Vec<_> = b.faces.iter().flatten().map(|faces| Some(faces.near)).collect();
         for (old, description) in self.model.plan.buffers.iter().enumerate() {
             let new = model.plan.buffers.iter().position(|d| d.name == description.name);
             let is_listed = b.found.contains(&Some(Buffer(old))) || lists.contains(&Some(Buffer(old)));
@@ -527,17 +531,20 @@ impl Simulation {
             else {
                 continue;
             };
+            // of gaps, those of faces are found again
+            let is_gaps = b.faces.iter().flatten().any(|faces| faces.gaps == Buffer(old));
             let bytes = self.backend.bytes(Buffer(old));
-            let bytes = if model.plan.buffers[new].len == description.len {
-                bytes
-            } else {
+            let bytes = if is_gaps || model.plan.buffers[new].len != description.len {
                 widen(
                     &bytes,
                     description.len,
                     &backend.bytes(Buffer(new)),
                     model.plan.buffers[new].len,
                     self.items_of(old),
+                    if is_gaps { GAPS } else { usize::MAX },
                 )
+            } else {
+                bytes
             };
             backend.set_bytes(Buffer(new), &bytes);
         }
@@ -552,7 +559,8 @@ impl Simulation {
     /// Rows of a table that grows with its slots.
     fn items_of(&self, buffer: usize) -> usize {
         let b = &self.model.buffers;
-        let kind = b.faces.iter().position(|f| f.is_some_and(|f| [f.keys, f.touches].contains(&Buffer(buffer))));
+        let kind =
+            b.faces.iter().position(|f| f.is_some_and(|f| [f.keys, f.touches, f.gaps].contains(&Buffer(buffer))));
         kind.map_or(self.mesh.beams(), |kind| self.model.points[kind].len())
     }
 
@@ -578,6 +586,8 @@ impl Simulation {
         self.largest_flow = self.largest_flow.max(flow + self.start_energy.abs()).max(e.output());
         let error = e.output() - self.start_energy - e.input();
         self.health.balance = error / self.largest_flow.max(NOISE);
+        let is_off = self.health.balance.abs() > 0.5 * self.case.integration.energy_tolerance;
+        self.half_off = is_off.then(|| self.half_off.unwrap_or(self.step));
         self.guards()?;
         self.choose_dt();
         Ok(())
@@ -629,15 +639,17 @@ impl Simulation {
     }
 }
 
-/// Slots of an old table in the first places of wider rows of a new one: lengths in numbers, and how many rows.
-fn widen(old: &[u8], old_len: usize, fresh: &[u8], new_len: usize, items: usize) -> Vec<u8> {
+/// Slots of an old table in the first places of wider rows of a new one: lengths in numbers, how many rows, and the most numbers that
+/// are taken from each.
+fn widen(old: &[u8], old_len: usize, fresh: &[u8], new_len: usize, items: usize, most: usize) -> Vec<u8> {
     let mut new = fresh.to_vec();
     if items == 0 || !old_len.is_multiple_of(items) || !new_len.is_multiple_of(items) {
         return new;
     }
     let (old_row, new_row) = (old.len() / items, new.len() / items);
+    let taken = old_row.min(most.saturating_mul(old.len() / old_len.max(1)));
     for item in 0..items {
-        new[item * new_row..][..old_row].copy_from_slice(&old[item * old_row..][..old_row]);
+        new[item * new_row..][..taken].copy_from_slice(&old[item * old_row..][..taken]);
     }
     new
 }

@@ -242,7 +242,7 @@ fn without_an_adapter_the_program_says_so() {
 fn the_program_names_the_device_and_refuses_what_it_cannot_do() {
     let Some(device) = device() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let output = program(&["--precision", "f64"], &[], folder.path());
+    let output = program(&["--adapter", &device.listed().name, "--precision", "f64"], &[], folder.path());
     assert_eq!(output.status.code(), Some(5), "{output:?}");
     assert!(String::from_utf8_lossy(&output.stderr).contains("f32"), "{output:?}");
     let output = program(&["--adapter", "no such thing"], &[], folder.path());

@@ -65,6 +65,42 @@ fn a_hexahedron_turned_inside_out() {
     assert!(guard.culprit.contains("hexahedron 0 of yarn"), "{guard}");
 }
 
+/// Rounding lets the energy of a stiff part drift, and too long a step lets it explode: the pace tells which.
+#[test]
+fn an_energy_that_drifts_is_told_from_one_that_explodes() {
+    let nodes: Vec<[f64; 3]> = (0..=50).map(|i| [0.2 * f64::from(i), 0.0, 0.0]).collect();
+    let rod = json!({ "name": "rod", "nodes": nodes, "radius_mm": 0.1, "axial_n": 11, "bending_n_mm2": 50, "linear_density_tex": 43.4 });
+    let effects = json!({ "gravity_mm_s2": [0.0, 0.0, -1e7], "damping": null });
+    let case = with(
+        bare(),
+        &[
+            ("/domain/mesh/threads", json!([rod])),
+            ("/domain/mesh/conditions", json!([{ "within": [[0, -1, -1], [0.21, 1, 1]] }])),
+            ("/effects", effects),
+            ("/integration", json!({ "energy_tolerance": 0.05 })),
+        ],
+    );
+    let guard = stopped(&mut start(&case, F32), 2e-3);
+    assert_eq!(guard.cause, "energy");
+    assert!(guard.advice.contains("drifts slowly") && guard.advice.contains("f64"), "{guard}");
+    let mut exact = start(&case, F64);
+    common::advance(&mut exact, 2e-4);
+    println!("balance in f64 {:.1e}", exact.health().balance);
+    assert!(exact.health().balance.abs() < 1e-4, "{}", exact.health().balance);
+
+    let cubes = json!([cube("cube", [0.0; 3])]);
+    let mut stable = start(&scene(cubes.clone(), Value::Null, json!({})), F64);
+    common::advance(&mut stable, 1e-7);
+    let dt = 2.9 * stable.health().dt_limit;
+    let mut body = cubes[0].clone();
+    body["velocity_mm_s"] = json!([10, 0, 0]);
+    let held = json!([{ "within": [[-1, -1, -1], [2, 2, 0]] }]);
+    let case = with(scene(json!([body]), Value::Null, json!({ "dt_s": dt })), &[("/domain/mesh/conditions", held)]);
+    let guard = stopped(&mut start(&case, F64), 1e-2);
+    assert_eq!(guard.cause, "energy", "{guard}");
+    assert!(guard.advice.contains("explodes") && !guard.advice.contains("drifts"), "{guard}");
+}
+
 #[test]
 fn energy_from_nowhere() {
     let mut simulation = start(&scene(json!([cube("cube", [0.0; 3])]), Value::Null, json!({})), F32);

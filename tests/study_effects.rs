@@ -56,6 +56,17 @@ fn an_effect_that_the_scene_does_not_have_is_refused_by_name() {
     assert!(message.contains("--only gravity") && message.contains("friction, "), "{message}");
 }
 
+/// Where the scene itself comes to a guard there is nothing to compare with: the guard is what is wrong.
+#[test]
+fn a_scene_that_a_guard_stops_is_the_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = with(coarse_cell(), &[("/integration", json!({ "energy_tolerance": 1e-6 }))]);
+    let options = options(folder.path(), &["friction"]);
+    let error = effects(&loaded(&case), &options).unwrap_err();
+    assert_eq!(error.exit_code(), 3, "{error}");
+    assert!(error.to_string().contains("energy guard") && !options.table.exists(), "{error}");
+}
+
 #[test]
 fn explain_names_every_effect_with_what_called_for_it_and_its_share() {
     let text = check(&loaded(&coarse_cell()), true).unwrap();

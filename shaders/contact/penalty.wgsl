@@ -129,10 +129,11 @@ fn is_nearer(pushed: ptr<function, Pushed>, point: Closest) -> bool {
     return !known.found || apart < -tie || apart <= tie && abs(point.height) > abs(known.height);
 }
 
-// Whether the point is behind the nearest place that is known, no deeper than what is pushed out.
-fn is_behind(pushed: ptr<function, Pushed>) -> bool {
+// Whether the point is behind the nearest place that is known, no deeper than what is pushed out, nor than `most`, which it can have
+// come to since it was looked at: at a corner of a crumpled surface, a point in front may look as if it were behind.
+fn is_behind(pushed: ptr<function, Pushed>, most: f32) -> bool {
     let known = (*pushed).nearest;
-    return known.found && known.height < 0.0 && known.distance < params.depth;
+    return known.found && known.height < 0.0 && known.distance < min(most, params.depth);
 }
 
 // Distance from which on a face cannot change what is nearest, mm.
@@ -298,7 +299,7 @@ fn look(here: Point, list: u32, first_gap: u32, part: vec2<u32>, most: f32, push
     var least = params.skin;
     for (var round = 0u; round < 2u; round++) {
         // a point that seems to be inside is so only if no other face is nearer
-        if round == 1u && !is_behind(pushed) {
+        if round == 1u && !is_behind(pushed, most) {
             break;
         }
         least = params.skin;
@@ -469,12 +470,13 @@ fn penalty(item: u32) {
     let first_gap = (GAPS + params.faces) * item;
     let made = (MADE + params.slots) * item;
     if keys[made] != near[first] {
-        // a new list: all faces are looked at, wherever the point may be
+        // a new list: all faces are looked at. How deep the point was inside stays known; before the first one it may be anywhere
+        let inner = select(gaps[first_gap + INNER], params.depth, keys[made] == EMPTY);
         keys[made] = near[first];
         for (var i = 0u; i < GAPS + faces_listed; i++) {
             gaps[first_gap + i] = 0.0;
         }
-        gaps[first_gap + INNER] = params.depth;
+        gaps[first_gap + INNER] = inner;
     }
     let closed = gaps[first_gap + CLOSED] + closing;
     if closed < gaps[first_gap + LEAST] {
@@ -512,7 +514,7 @@ fn penalty(item: u32) {
         pushed.last.entry = EMPTY;
         least = min(least, look(here, list, first_gap + GAPS, vec2<u32>(start, end), most, &pushed));
         var depth = 0.0;
-        if is_behind(&pushed) {
+        if is_behind(&pushed, most) {
             depth = push_out(here, &pushed);
         }
         inner = max(inner, depth);

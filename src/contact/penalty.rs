@@ -97,13 +97,15 @@ struct Kept<'a, R> {
 }
 
 impl<R: Real> Kept<'_, R> {
-    /// With a new list all faces are looked at, wherever the point may be: up to `depth` (mm) inside.
+    /// With a new list all faces are looked at. How deep the point was inside stays known; before the first one it may be anywhere up
+    /// to `depth` (mm).
     #[inline(always)]
     fn renew(&mut self, made: u32, depth: R) {
         if self.keys[0] != made {
+            let inner = if self.keys[0] == EMPTY { depth } else { self.gaps[INNER] };
             self.keys[0] = made;
             self.gaps.fill(R::from_f64(0.0));
-            self.gaps[INNER] = depth;
+            self.gaps[INNER] = inner;
         }
     }
 }
@@ -299,11 +301,12 @@ impl<R: Real> Pushed<R> {
         !known.found || apart < -tie || apart <= tie && point.height.abs() > known.height.abs()
     }
 
-    /// Whether the point is behind the nearest place that is known, no deeper than what is pushed out.
+    /// Whether the point is behind the nearest place that is known, no deeper than what is pushed out, nor than `most` (mm), which it
+    /// can have come to since it was looked at: at a corner of a crumpled surface, a point in front may look as if it were behind.
     #[inline(always)]
-    fn is_behind(&self, params: &Params) -> bool {
+    fn is_behind(&self, params: &Params, most: R) -> bool {
         let Nearest { found, distance, height, .. } = self.nearest;
-        found && height < R::from_f64(0.0) && distance < R::from_f64(f64::from(params.depth))
+        found && height < R::from_f64(0.0) && distance < most.min(R::from_f64(f64::from(params.depth)))
     }
 
     /// Distance from which on a face cannot change what is nearest, mm.
@@ -401,7 +404,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
             let (entries, gaps) = (&list[first..end], GAPS + first..GAPS + end);
             let mut pushed = self.look(at, entries, &mut kept.gaps[gaps.clone()], most);
             least = kept.gaps[gaps.clone()].iter().fold(least, |least, gap| least.min(*gap));
-            let depth = if pushed.is_behind(&self.params) { pushed.push_out(at) } else { zero };
+            let depth = if pushed.is_behind(&self.params, most) { pushed.push_out(at) } else { zero };
             inner = inner.max(depth);
             if let Some(rubbed) = self.settle(at, body, depth, &mut pushed, kept) {
                 touching = true;
@@ -506,7 +509,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         let mut pushed = Pushed::none();
         for again in [false, true] {
             // a point that seems to be inside is so only if no other face is nearer
-            if again && !pushed.is_behind(&self.params) {
+            if again && !pushed.is_behind(&self.params, most) {
                 break;
             }
             for (gap, entry) in gaps.iter_mut().zip(entries) {

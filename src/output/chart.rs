@@ -1,4 +1,5 @@
-//! Charts as SVG: curves over a common axis, and maps of coloured points.
+//! Charts as SVG: curves over a common axis, and maps of coloured points. A page styles them; what they need to be read without it
+//! stands in them.
 
 use super::colour;
 use std::fmt::Write as _;
@@ -69,18 +70,30 @@ pub fn curves(axis: [&str; 2], curves: &[Curve]) -> Option<String> {
     // writing to a String does not fail
     for v in &xs {
         let at = x(*v);
-        let _ = write!(t, "<path class=\"g\" d=\"M{at:.1} {top}V{bottom}\"/>");
-        let _ = write!(t, "<text x=\"{at:.1}\" y=\"{:.1}\" class=\"m\">{}</text>", bottom + 18.0, label(*v, &xs));
+        let _ = write!(t, "<path class=\"g\" fill=\"none\" stroke=\"#d9dce0\" d=\"M{at:.1} {top}V{bottom}\"/>");
+        let _ = write!(
+            t,
+            "<text x=\"{at:.1}\" y=\"{:.1}\" class=\"m\" text-anchor=\"middle\">{}</text>",
+            bottom + 18.0,
+            label(*v, &xs)
+        );
     }
     for v in &ys {
         let at = y(*v);
-        let _ = write!(t, "<path class=\"g\" d=\"M{left} {at:.1}H{right}\"/>");
-        let _ = write!(t, "<text x=\"{:.1}\" y=\"{:.1}\" class=\"e\">{}</text>", left - 7.0, at + 4.5, label(*v, &ys));
+        let _ = write!(t, "<path class=\"g\" fill=\"none\" stroke=\"#d9dce0\" d=\"M{left} {at:.1}H{right}\"/>");
+        let _ = write!(
+            t,
+            "<text x=\"{:.1}\" y=\"{:.1}\" class=\"e\" text-anchor=\"end\">{}</text>",
+            left - 7.0,
+            at + 4.5,
+            label(*v, &ys)
+        );
     }
-    let _ = write!(t, "<path class=\"a\" d=\"M{left:.1} {0:.1}H{right:.1}\"/>", y(0.0));
+    let _ =
+        write!(t, "<path class=\"a\" fill=\"none\" stroke=\"#8b929b\" d=\"M{left:.1} {0:.1}H{right:.1}\"/>", y(0.0));
     let _ = write!(
         t,
-        "<text x=\"{:.1}\" y=\"{:.1}\" class=\"m\">{}</text>",
+        "<text x=\"{:.1}\" y=\"{:.1}\" class=\"m\" text-anchor=\"middle\">{}</text>",
         0.5 * (left + right),
         height - 12.0,
         escaped(axis[0])
@@ -104,8 +117,8 @@ pub fn curves(axis: [&str; 2], curves: &[Curve]) -> Option<String> {
             }
             down = draws;
         }
-        let _ = write!(t, "<path class=\"c\" {style} d=\"{line}\"/>");
-        let _ = write!(t, "<path class=\"c\" {style} d=\"M{pen:.1} {high}h26\"/>");
+        let _ = write!(t, "<path class=\"c\" fill=\"none\" {style} d=\"{line}\"/>");
+        let _ = write!(t, "<path class=\"c\" fill=\"none\" {style} d=\"M{pen:.1} {high}h26\"/>");
         let _ = write!(t, "<text x=\"{:.1}\" y=\"{:.1}\">{}</text>", pen + 32.0, high + 4.5, escaped(curve.name));
     }
     t.push_str("</svg>");
@@ -154,9 +167,19 @@ pub fn map(name: &str, points: &[[f64; 3]], range: Option<[f64; 2]>) -> Option<S
     }
     // to a twentieth of the range
     let ends = [high, high - (high - low) / 20.0];
-    let _ = write!(t, "<text x=\"102\" y=\"{:.1}\" class=\"e\">{}</text>", bar + 9.5, label(low, &ends));
+    let _ = write!(
+        t,
+        "<text x=\"102\" y=\"{:.1}\" class=\"e\" text-anchor=\"end\">{}</text>",
+        bar + 9.5,
+        label(low, &ends)
+    );
     let _ = write!(t, "<text x=\"418\" y=\"{:.1}\">{}</text>", bar + 9.5, label(high, &ends));
-    let _ = write!(t, "<text x=\"260\" y=\"{:.1}\" class=\"m\">{}</text></svg>", bar + 27.0, escaped(name));
+    let _ = write!(
+        t,
+        "<text x=\"260\" y=\"{:.1}\" class=\"m\" text-anchor=\"middle\">{}</text></svg>",
+        bar + 27.0,
+        escaped(name)
+    );
     Some(t)
 }
 

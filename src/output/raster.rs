@@ -71,8 +71,12 @@ pub fn draw(scene: &Scene, shifts: &[[f32; 3]], camera: &Camera, clip: &Clip) ->
     let fine = camera.finer();
     let triangles = triangles(scene, shifts, &fine, clip);
     let mut buffer = vec![NOTHING; fine.width * fine.height];
-    buffer.par_chunks_mut(fine.width * BAND).enumerate().for_each(|(band, rows)| {
-        triangles.iter().for_each(|triangle| triangle.fill(rows, band * BAND, &fine, clip));
+    let mut bands = vec![Vec::new(); fine.height.div_ceil(BAND)];
+    for (number, triangle) in triangles.iter().enumerate().filter(|(_, triangle)| triangle.rows[0] < triangle.rows[1]) {
+        bands[triangle.rows[0] / BAND..=(triangle.rows[1] - 1) / BAND].iter_mut().for_each(|band| band.push(number));
+    }
+    buffer.par_chunks_mut(fine.width * BAND).zip(&bands).enumerate().for_each(|(band, (rows, own))| {
+        own.iter().for_each(|number| triangles[*number].fill(rows, band * BAND, &fine, clip));
     });
     let heights = Heights::of(&buffer, camera);
     let mut image = Image::new(camera.width, camera.height, colour::background());

@@ -5,7 +5,7 @@
 //! yarn or thread through the periodic cell: a copy stands at its image position, so that every cell is valid.
 //!
 //! Written besides the fields of the frame, whose fields of the same name they replace:
-//! points `displacement_mm` (current less reference position, for a copy in its image);
+//! points `displacement_mm` (current less reference position, for a copy in its image) and `thread_radius_mm` (0 on yarns);
 //! cells `body` (blocks, then threads, counted from 0), `ply` (0 warp, 1 weft, 2 free, 3 thread), `part` (0 loop,
 //! 1 underlap, 2 free thread, −1 yarn), `thread` (−1 for yarns), `radius_mm` (0 for yarns) and `fibre` (unit vector, deformed:
 //! the fibre direction of a yarn, the axis of a beam).

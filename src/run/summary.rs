@@ -172,11 +172,11 @@ impl Run<'_> {
             );
         }
         if let Some((number, share)) = self.rest {
-            let verdict = if share < AT_REST { "at rest" } else { "still moving: hold longer, or damp more" };
+            let (verdict, advice) =
+                if share < AT_REST { ("at rest", "") } else { ("still moving", ": hold longer, or damp more") };
             let _ = writeln!(
                 t,
-                "rest       {} after load step {} ({}): {:.2} % of the energy is kinetic",
-                verdict,
+                "rest       {verdict} after load step {} ({}), {:.2} % of the energy is kinetic{advice}",
                 number + 1,
                 self.loaded.case.steps[number].name(),
                 100.0 * share

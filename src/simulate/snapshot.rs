@@ -108,6 +108,7 @@ impl Simulation {
         self.health.record(record);
         self.stress.record(record);
         self.ready.record(record);
+        self.half_off.record(record);
         self.owed.iter_mut().for_each(|x| x.record(record));
     }
 

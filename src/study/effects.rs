@@ -8,7 +8,7 @@
 use super::difference::difference;
 use super::results::{MEASURES, Measure, Results};
 use crate::case::read::Loaded;
-use crate::error::{Error, Result};
+use crate::error::{Error, Guard, Result};
 use crate::output::directory;
 use crate::output::table::{Cell, Table};
 use crate::run::effects::effects as effects_of;
@@ -54,9 +54,15 @@ pub struct Study {
 struct Done {
     loaded: Loaded,
     folder: PathBuf,
-    /// What stopped it, or that it finished.
-    verdict: String,
+    /// What stopped it; `None` if it finished.
+    guard: Option<Guard>,
     results: Results,
+}
+
+impl Done {
+    fn verdict(&self) -> &str {
+        self.guard.as_ref().map_or("finished", |guard| &guard.cause)
+    }
 }
 
 /// One row of the table.
@@ -74,7 +80,7 @@ struct Row {
 ///
 /// # Errors
 /// An effect that the scene does not have, a folder that is in use, a table that cannot be written. A guard that stops a variant is
-/// its verdict.
+/// its verdict; one that stops the scene itself is an error, since there is nothing to compare with.
 pub fn effects(loaded: &Loaded, options: &Options) -> Result<Study> {
     let scene = plain(loaded, options);
     let mut variants = vec![(NOTHING, aside(&scene))];
@@ -83,6 +89,9 @@ pub fn effects(loaded: &Loaded, options: &Options) -> Result<Study> {
     directory::check(&folder, options.force)?;
     let interrupted = || Study { text: "interrupted".into(), interrupted: true };
     let Some(whole) = finish(&scene, &folder.join("all"), options)? else { return Ok(interrupted()) };
+    if let Some(guard) = whole.guard {
+        return Err(Error::Guard(guard));
+    }
     let measures: Vec<&Measure> = MEASURES.iter().filter(|m| !whole.results.curve(m).is_empty()).collect();
     let header = COLUMNS.map(String::from).into_iter().chain(measures.iter().map(|m| m.name.replace(' ', "_") + "_l2"));
     let header: Vec<String> = header.collect();
@@ -154,14 +163,14 @@ fn finish(scene: &Loaded, folder: &Path, options: &Options) -> Result<Option<Don
         from: None,
         quiet: true,
     };
-    let verdict = match run::run_on(scene, &how, options.make.clone()) {
+    let guard = match run::run_on(scene, &how, options.make.clone()) {
         Ok(outcome) if outcome.interrupted => return Ok(None),
-        Ok(_) => "finished".into(),
-        Err(Error::Guard(guard)) => guard.cause,
+        Ok(_) => None,
+        Err(Error::Guard(guard)) => Some(guard),
         Err(error) => return Err(error),
     };
     let results = Results::read(folder)?;
-    Ok(Some(Done { loaded: scene.clone(), folder: folder.into(), verdict, results }))
+    Ok(Some(Done { loaded: scene.clone(), folder: folder.into(), guard, results }))
 }
 
 /// What a variant costs and changes.
@@ -175,16 +184,15 @@ fn compare(name: &'static str, variant: &Done, whole: &Done, measures: &[&Measur
         _ => Ratio { median: f64::NAN, spread: f64::NAN },
     };
     let [steps, all] = [variant, whole].map(|done| done.results.number("steps"));
-    let finished = variant.verdict == whole.verdict;
     let change = |measure: &&Measure| {
         difference(&variant.results.curve(measure), &whole.results.curve(measure)).map_or(f64::NAN, |d| d.l2)
     };
     Ok(Row {
         name,
-        verdict: variant.verdict.clone(),
+        verdict: variant.verdict().to_owned(),
         steps,
         step_time,
-        run_time: if finished { step_time.median * steps / all } else { f64::NAN },
+        run_time: if variant.guard.is_none() { step_time.median * steps / all } else { f64::NAN },
         changes: measures.iter().map(change).collect(),
     })
 }
@@ -209,9 +217,8 @@ fn text(whole: &Done, measures: &[&Measure], rows: &[Row], table: &Path) -> Stri
     // writing to a String does not fail
     let _ = writeln!(
         t,
-        "{}: {}, {} steps; without each of its effects, times over those with all, and changes of curves over {} in L2",
+        "{}: {} steps; without each of its effects, times over those with all, and changes of curves over {} in L2",
         whole.loaded.case.title,
-        whole.verdict,
         whole.results.number("steps"),
         whole.results.axis().name()
     );
