@@ -88,14 +88,15 @@ fn an_energy_that_drifts_is_told_from_one_that_explodes() {
     println!("balance in f64 {:.1e}", exact.health().balance);
     assert!(exact.health().balance.abs() < 1e-4, "{}", exact.health().balance);
 
-    let cubes = json!([cube("cube", [0.0; 3])]);
-    let mut stable = start(&scene(cubes.clone(), Value::Null, json!({})), F64);
-    common::advance(&mut stable, 1e-7);
-    let dt = 2.9 * stable.health().dt_limit;
-    let mut body = cubes[0].clone();
+    let mut body = cube("cube", [0.0; 3]);
     body["velocity_mm_s"] = json!([10, 0, 0]);
     let held = json!([{ "within": [[-1, -1, -1], [2, 2, 0]] }]);
-    let case = with(scene(json!([body]), Value::Null, json!({ "dt_s": dt })), &[("/domain/mesh/conditions", held)]);
+    let cube = scene(json!([body]), Value::Null, json!({}));
+    let case = with(cube, &[("/domain/mesh/conditions", held)]);
+    let mut stable = start(&case, F64);
+    common::advance(&mut stable, 1e-7);
+    let limit = stable.measured_limit().unwrap().dt;
+    let case = with(case, &[("/integration", json!({ "dt_s": 1.03 * limit }))]);
     let guard = stopped(&mut start(&case, F64), 1e-2);
     assert_eq!(guard.cause, "energy", "{guard}");
     assert!(guard.advice.contains("explodes") && !guard.advice.contains("drifts"), "{guard}");
