@@ -65,7 +65,7 @@ fn a_hexahedron_turned_inside_out() {
     assert!(guard.culprit.contains("hexahedron 0 of yarn"), "{guard}");
 }
 
-/// Rounding lets the energy of a stiff part drift, and too long a step lets it explode: the pace tells which.
+/// Rounding in f32 lets the energy of a stiff part drift, which in f64 is kept.
 #[test]
 fn an_energy_that_drifts_is_told_from_one_that_explodes() {
     let nodes: Vec<[f64; 3]> = (0..=50).map(|i| [0.2 * f64::from(i), 0.0, 0.0]).collect();
@@ -87,19 +87,6 @@ fn an_energy_that_drifts_is_told_from_one_that_explodes() {
     common::advance(&mut exact, 2e-4);
     println!("balance in f64 {:.1e}", exact.health().balance);
     assert!(exact.health().balance.abs() < 1e-4, "{}", exact.health().balance);
-
-    let mut body = cube("cube", [0.0; 3]);
-    body["velocity_mm_s"] = json!([10, 0, 0]);
-    let held = json!([{ "within": [[-1, -1, -1], [2, 2, 0]] }]);
-    let cube = scene(json!([body]), Value::Null, json!({}));
-    let case = with(cube, &[("/domain/mesh/conditions", held)]);
-    let mut stable = start(&case, F64);
-    common::advance(&mut stable, 1e-7);
-    let limit = stable.measured_limit().unwrap().dt;
-    let case = with(case, &[("/integration", json!({ "dt_s": 1.03 * limit }))]);
-    let guard = stopped(&mut start(&case, F64), 1e-2);
-    assert_eq!(guard.cause, "energy", "{guard}");
-    assert!(guard.advice.contains("explodes") && !guard.advice.contains("drifts"), "{guard}");
 }
 
 #[test]
@@ -118,6 +105,7 @@ fn energy_from_nowhere() {
     let guard = stopped(&mut whole, 1e-3);
     assert_eq!(guard.cause, "energy");
     assert!(guard.culprit.contains("fastest now: node ") && guard.culprit.contains(" (cube) at "), "{guard}");
+    assert!(guard.advice.contains("explodes") && !guard.advice.contains("drifts"), "{guard}");
 }
 
 #[test]
