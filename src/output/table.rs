@@ -5,7 +5,7 @@
 use crate::error::{Error, Result};
 use std::fmt::Write as _;
 use std::fs::{File, OpenOptions};
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Columns of `history.csv`.
@@ -212,10 +212,22 @@ impl Table {
         Ok(self.len)
     }
 
-    /// Refuses a table with fewer bytes than it had.
+    /// Refuses a table with fewer bytes than it had, or whose rows do not end where they did.
     pub fn check_length(&self, len: u64) -> Result<()> {
         if self.len >= len {
-            return Ok(());
+            let mut last = [0];
+            let mut file = &self.file;
+            let read =
+                len.checked_sub(1).map(|at| file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(&mut last)));
+            read.unwrap_or(Ok(()))
+                .and_then(|()| file.seek(SeekFrom::End(0)))
+                .map_err(|e| Error::file(&self.path, e))?;
+            if last == *b"\n" {
+                return Ok(());
+            }
+            let message =
+                format!("has no end of a row at byte {len}, where its checkpoint has one: it has been changed");
+            return Err(Error::file(&self.path, message));
         }
         let message =
             format!("holds {} bytes, but {len} when the checkpoint was written: it has been changed", self.len);
