@@ -155,15 +155,8 @@ enum Command {
         #[arg(long, value_name = "NAME")]
         field: Option<String>,
         /// Values at both ends of the colours [default: those of the frame]
-        #[arg(
-            long,
-            value_name = "LOW,HIGH",
-            value_delimiter = ',',
-            num_args = 2,
-            allow_negative_numbers = true,
-            requires = "field"
-        )]
-        range: Option<Vec<f64>>,
+        #[arg(long, value_name = "LOW,HIGH", value_parser = ends, allow_hyphen_values = true, requires = "field")]
+        range: Option<[f64; 2]>,
         /// Width of the picture in pixels
         #[arg(long, default_value_t = 1600, value_parser = clap::value_parser!(u16).range(300..=6000))]
         width: u16,
@@ -260,6 +253,12 @@ impl CaseArguments {
     fn read(&self) -> Result<Loaded> {
         read(&self.case, &self.set)
     }
+}
+
+/// Two numbers with a comma between them.
+fn ends(text: &str) -> std::result::Result<[f64; 2], String> {
+    let numbers = text.split(',').map(|number| number.trim().parse().ok()).collect::<Option<Vec<f64>>>();
+    numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| "give two numbers, as 0,0.4".into())
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -388,7 +387,6 @@ fn perform(command: Command) -> Result<Done> {
         }
         Command::Picture { source, frame, field, range, width, output } => {
             let out = output.unwrap_or_else(|| picture_path(&source));
-            let range = range.map(|ends| [ends[0], ends[1]]);
             let view = View { field, range, width_px: width.into(), ..View::default() };
             run::picture(&source, frame.as_deref(), &view, &out)?
         }

@@ -103,6 +103,12 @@ fn the_command_line_is_checked() {
     assert!(fabric.contains("this is a fabric, not a case"), "{fabric}");
     assert!(one_line(&tricot(&["run"], here), 2).contains("<CASE>"));
     assert!(one_line(&tricot(&["walk"], here), 2).contains("walk"));
+    for range in ["1", "1,2,3", "low,high"] {
+        let picture = tricot(&["picture", ".", "--field", "tension_n", "--range", range], here);
+        assert!(one_line(&picture, 2).contains("give two numbers, as 0,0.4"), "{range}");
+    }
+    let picture = tricot(&["picture", ".", "--field", "tension_n", "--range", "-1,0.4"], here);
+    assert!(one_line(&picture, 4).contains("no run.pvd in this folder"), "the range is taken");
     assert!(one_line(&tricot(&["run", GOOD, "--threads", "0"], here), 2).contains("1..=1024"));
     assert!(one_line(&tricot(&["run", GOOD, "--precision", "f16"], here), 2).contains("f32, f64"));
     assert_eq!(one_line(&tricot(&["check", "no.json"], here), 4), "error: no.json: no such file\n");
