@@ -204,11 +204,11 @@ impl Pulled {
         let _ = writeln!(t, "force      {forces}");
         let zones = [("A", a), ("B", b), ("C", c)].into_iter().filter(|(_, angle)| !angle.is_nan());
         let zones: Vec<String> = zones.map(|(zone, angle)| format!("{zone} {angle:.2}°")).collect();
-        if zones.is_empty() {
-            let _ = writeln!(t, "zones      none: no crossing lies well inside one");
-        } else {
-            let _ = writeln!(t, "zones      sheared by {} at {:.2} mm{theory}", zones.join(", "), self.last[0]);
+        // other yarns than those at ±45° have no zones of shear
+        if self.bias.is_none() || zones.is_empty() {
+            return t;
         }
+        let _ = writeln!(t, "zones      sheared by {} at {:.2} mm{theory}", zones.join(", "), self.last[0]);
         if c.is_nan() {
             return t;
         }

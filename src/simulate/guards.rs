@@ -13,7 +13,7 @@ use crate::kernel::position::MOST_MM;
 const SURELY_UNSTABLE: f64 = 3.0;
 
 /// Steps from a half of the tolerance of the energy balance to all of it that an unstable step needs at most.
-const EXPLODED: u64 = 4 * WINDOW;
+const EXPLODED: u64 = 2 * WINDOW;
 
 impl Simulation {
     pub(super) fn guards(&self) -> Result<()> {
@@ -45,7 +45,13 @@ impl Simulation {
                 self.node_owner(node)
             );
             let advice = match (self.drifts(), self.make.precision) {
-                (false, _) => "it explodes, as with too long a step: lower integration.safety or integration.dt_max_s",
+                (false, Precision::F32) => {
+                    "it explodes, as with too long a step: lower integration.safety or integration.dt_max_s; where that does not help, \
+                     set integration.precision to f64"
+                }
+                (false, Precision::F64) => {
+                    "it explodes, as with too long a step: lower integration.safety or integration.dt_max_s"
+                }
                 (true, Precision::F32) => {
                     "it drifts slowly, as by rounding of stiff parts in f32, whatever the step: set integration.precision to f64"
                 }
@@ -59,7 +65,7 @@ impl Simulation {
     }
 
     /// Whether the energy balance has gone off slowly, as by rounding, rather than exploded. A step that is longer than its limit by a
-    /// ten-thousandth multiplies an energy by 1.06 with every step, so what takes hundreds of steps to double is no instability.
+    /// ten-thousandth multiplies an energy by 1.06 with every step, so what needs more than two windows to double is no instability.
     fn drifts(&self) -> bool {
         self.half_off.is_some_and(|since| self.step > since + EXPLODED)
     }
