@@ -69,15 +69,21 @@ impl Run<'_> {
         file::replace(&path, |w| serde_json::to_writer_pretty(w, &summary).map_err(Into::into))
     }
 
+    /// Root mean square by which the membrane force along x or y missed its aim over the rows of shear, N/mm; `None` without an aim.
+    fn missed(&self, axis: usize) -> Option<f64> {
+        let rows = self.missed[2];
+        let driven = self.simulation.fibres()[axis].error.is_some() && rows > 0.0;
+        driven.then(|| libm::sqrt(self.missed[axis] / rows))
+    }
+
     /// Stretch and membrane force along the fibres of a cell, by ply.
     fn fibres(&self) -> Value {
-        let [weft, warp] = [0, 1].map(|k| {
-            let fibres = self.simulation.fibres()[k];
-            let missed = (self.missed[2] > 0.0).then(|| libm::sqrt(self.missed[k] / self.missed[2]));
+        let [weft, warp] = [0, 1].map(|axis| {
+            let fibres = self.simulation.fibres()[axis];
             json!({
                 "stretch": fibres.stretch,
                 "membrane_n_per_mm": fibres.force,
-                "error_in_shear_n_per_mm": fibres.error.and(missed),
+                "error_in_shear_n_per_mm": self.missed(axis),
             })
         });
         json!({ "warp": warp, "weft": weft })
@@ -156,9 +162,11 @@ impl Run<'_> {
             }
         }
         if s.mesh.period.is_some() {
-            let ([weft, warp], [x, y, rows]) = (s.fibres(), self.missed);
-            let missed = if rows > 0.0 && (weft.error.is_some() || warp.error.is_some()) {
-                format!("; off its aim by {:.4} / {:.4} (rms in shear)", libm::sqrt(y / rows), libm::sqrt(x / rows))
+            let [weft, warp] = s.fibres();
+            let misses = [1, 0].map(|axis| self.missed(axis));
+            let missed = if misses.iter().any(Option::is_some) {
+                let [warp, weft] = misses.map(|miss| miss.map_or("–".into(), |miss| format!("{miss:.4}")));
+                format!("; off its aim by {warp} / {weft} (rms in shear)")
             } else {
                 String::new()
             };
