@@ -7,11 +7,11 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::time::Instant;
 use tricot::backend::gpu::Device;
-use tricot::case::read::read;
 use tricot::kernel::shader::{ENTRY, Text};
 use tricot::kernel::stage::Stage;
+use tricot::rigs::read::read;
 use tricot::run::simulation;
-use tricot::simulate::{Make, Simulation};
+use tricot::simulate::{BackendConfig, Simulation};
 
 /// A quick pre-tension, so that contact is as busy as in most of a run, and where timing starts, s.
 const QUICK: [&str; 2] = ["steps.0.pretension.time_s=1e-4", "steps.1.stretch.time_s=5e-5"];
@@ -29,14 +29,14 @@ fn main() {
     let sets = [format!("domain.cell.warps={warps}"), format!("domain.cell.wefts={wefts}")];
     let sets: Vec<String> = QUICK.map(String::from).into_iter().chain(sets).collect();
     let loaded = read(Path::new("cases/unit_cell_shear.json"), &sets).unwrap_or_else(|e| panic!("{e}"));
-    let make = Make { device: Some(device.clone()), ..Make::default() };
-    let mut sheet = simulation(&loaded, make).unwrap_or_else(|e| panic!("{e}"));
-    let hexes = sheet.mesh.hexes();
+    let config = BackendConfig { device: Some(device.clone()), ..BackendConfig::default() };
+    let mut sheet = simulation(&loaded, config).unwrap_or_else(|e| panic!("{e}"));
+    let hexes = sheet.mesh().hexes();
     println!(
         "{} hexes, {} beams, {} nodes; {}",
         hexes,
-        sheet.mesh.beams(),
-        sheet.mesh.nodes.len(),
+        sheet.mesh().beams(),
+        sheet.mesh().nodes.len(),
         sheet.backend().describe()
     );
     go(&mut sheet, START);

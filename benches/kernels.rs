@@ -9,14 +9,14 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use tricot::backend::{Backend, cpu::Cpu};
-use tricot::case::read::read;
 use tricot::elements::LANES;
 use tricot::elements::block::Header;
 use tricot::kernel::buffer::Buffer;
 use tricot::kernel::row::Row;
 use tricot::kernel::stage::Stage;
+use tricot::rigs::read::read;
 use tricot::run::simulation;
-use tricot::simulate::{Make, Simulation};
+use tricot::simulate::{BackendConfig, Simulation};
 
 /// Tightens the stitch soon, so that contact is as busy as in most of a run.
 const QUICK: [&str; 2] = ["steps.0.pretension.time_s=3e-4", "steps.1.stretch.time_s=1e-4"];
@@ -29,8 +29,8 @@ const BARE_BLOCKS: usize = 32;
 
 fn main() {
     let loaded = read(Path::new("cases/unit_cell_shear.json"), &QUICK.map(String::from)).expect("the case is valid");
-    let make = Make { threads: 1, ..Make::default() };
-    let mut cell = simulation(&loaded, make.clone()).expect("the cell can be built");
+    let config = BackendConfig { threads: 1, ..BackendConfig::default() };
+    let mut cell = simulation(&loaded, config.clone()).expect("the cell can be built");
     cell.advance(START, |_| false).expect("the cell runs");
 
     let row = cell.schedule.row(cell.time(), cell.dt(), cell.dt(), |_| [1.0; 2]);
@@ -41,16 +41,16 @@ fn main() {
         .configure_from_args();
     let plan = cell.model.plan.clone();
     for stage in &plan.step {
-        bench(&mut criterion, stage.name, &cell, &make, std::slice::from_ref(stage), row);
+        bench(&mut criterion, stage.name, &cell, &config, std::slice::from_ref(stage), row);
     }
     for (name, stages) in
         [("all of search", &plan.search), ("all of diagnose", &plan.diagnose), ("all of collect", &plan.collect)]
     {
-        bench(&mut criterion, name, &cell, &make, stages, row);
+        bench(&mut criterion, name, &cell, &config, stages, row);
     }
     criterion.final_summary();
 
-    let bare = bare(&cell, &make, row);
+    let bare = bare(&cell, &config, row);
     report(&mut cell, bare);
 }
 
@@ -65,16 +65,23 @@ fn advance(cell: &mut Simulation, steps: u64) -> u64 {
 }
 
 /// A backend in the state of a simulation.
-fn copy(cell: &Simulation, make: &Make) -> Cpu<f32> {
-    let mut backend = Cpu::new(&cell.model.plan.buffers, make.threads, make.isa);
+fn copy(cell: &Simulation, config: &BackendConfig) -> Cpu<f32> {
+    let mut backend = Cpu::new(&cell.model.plan.buffers, config.threads, config.isa);
     for buffer in (0..cell.model.plan.buffers.len()).map(Buffer) {
         backend.set_bytes(buffer, &cell.backend().bytes(buffer));
     }
     backend
 }
 
-fn bench(criterion: &mut Criterion, name: &str, cell: &Simulation, make: &Make, stages: &[Stage], row: Row<f64>) {
-    let mut backend = copy(cell, make);
+fn bench(
+    criterion: &mut Criterion,
+    name: &str,
+    cell: &Simulation,
+    config: &BackendConfig,
+    stages: &[Stage],
+    row: Row<f64>,
+) {
+    let mut backend = copy(cell, config);
     criterion.bench_function(name, |bencher| {
         bencher.iter_custom(|count| {
             let rows = vec![row; count as usize];
@@ -86,7 +93,7 @@ fn bench(criterion: &mut Criterion, name: &str, cell: &Simulation, make: &Make, 
 }
 
 /// Hexahedra per second of the kernel alone, the best of some repetitions.
-fn bare(cell: &Simulation, make: &Make, row: Row<f64>) -> f64 {
+fn bare(cell: &Simulation, config: &BackendConfig, row: Row<f64>) -> f64 {
     const ROUNDS: usize = 200;
     let model = &cell.model;
     let stage = model.plan.step.iter().find(|s| s.name == "hex8").expect("the cell has hexahedra");
@@ -96,7 +103,7 @@ fn bare(cell: &Simulation, make: &Make, row: Row<f64>) -> f64 {
     let count = headers.iter().take_while(|h| h.contiguous == 1).count().min(BARE_BLOCKS);
     assert!(count > 0, "no block has consecutive nodes");
     let stage = Stage { first: 0, count, grain: count, ..stage.clone() };
-    let mut backend = copy(cell, make);
+    let mut backend = copy(cell, config);
     let rows = vec![row; ROUNDS];
     let best = (0..12).map(|_| {
         let started = Instant::now();
@@ -122,7 +129,7 @@ fn report(cell: &mut Simulation, bare: f64) {
         })
         .collect();
     let total: f64 = spent.iter().map(|(_, t)| t).sum();
-    println!("\n{} hexes, {} beams; {}", cell.mesh.hexes(), cell.mesh.beams(), cell.backend().describe());
+    println!("\n{} hexes, {} beams; {}", cell.mesh().hexes(), cell.mesh().beams(), cell.backend().describe());
     println!(
         "stage                     us/step   share   (mean of {steps} steps, {} searches)",
         cell.searches() - searches
@@ -141,7 +148,7 @@ fn report(cell: &mut Simulation, bare: f64) {
         100.0 * forces / total,
         100.0 * search / total
     );
-    let hexes = cell.mesh.hexes() as f64;
+    let hexes = cell.mesh().hexes() as f64;
     let real = hexes / of(&|n| n == "hex8" || n == "assemble");
     println!(
         "real/bare: {:.0} % (hexes with assembly in the loop {:.2} M/s, hexes alone in the loop {:.2} M/s, bare kernel {:.2} M/s)",

@@ -4,9 +4,9 @@
 use criterion::{Criterion, SamplingMode};
 use std::path::Path;
 use std::time::{Duration, Instant};
-use tricot::case::read::read;
+use tricot::rigs::read::read;
 use tricot::run::simulation;
-use tricot::simulate::Make;
+use tricot::simulate::BackendConfig;
 
 /// Tightens the stitch soon, so that contact is as busy as in most of a run.
 const QUICK: [&str; 2] = ["steps.0.pretension.time_s=3e-4", "steps.1.stretch.time_s=1e-4"];
@@ -24,7 +24,8 @@ fn main() {
         .configure_from_args();
     let mut lines = Vec::new();
     for (name, threads) in [("one thread", 1), ("all cores", 0)] {
-        let mut cell = simulation(&loaded, Make { threads, ..Make::default() }).expect("the cell can be built");
+        let mut cell =
+            simulation(&loaded, BackendConfig { threads, ..BackendConfig::default() }).expect("the cell can be built");
         cell.advance(START, |_| false).expect("the cell runs");
         let (mut steps, mut spent) = (0, Duration::ZERO);
         let mut group = criterion.benchmark_group("64 steps");
@@ -44,9 +45,9 @@ fn main() {
         lines.push(format!(
             "{:.3} ms per step, {:.2} M hexes/s; {} hexes, {} beams; {}",
             1e3 * step,
-            1e-6 * cell.mesh.hexes() as f64 / step,
-            cell.mesh.hexes(),
-            cell.mesh.beams(),
+            1e-6 * cell.mesh().hexes() as f64 / step,
+            cell.mesh().hexes(),
+            cell.mesh().beams(),
             cell.backend().describe()
         ));
     }

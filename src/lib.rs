@@ -20,12 +20,13 @@
 //!
 //! # How data flow
 //! ```text
-//! case.json ─► case ─► fabric ─► mesh ─► plan ──────► backend ◄── schedule ─► measure ─► output
-//!  what the     typed,  yarns,    nodes,  buffers and  runs        loads in    sizes,     vtu, csv,
-//!  user wrote   checked threads   hexes,  stages: the  stages,     time        tensions,  png, json
-//!                                 beams   algorithm    knows no                force
-//!                                         as data      physics
-//!               └────────── run: one case from end to end, around simulate: the loop in time ──────────┘
+//! case.json ─► case ─► rigs/<rig> ─► Scene ─► plan ──────► backend ◄── schedule      the engine knows no JSON and no rig
+//!  what the     typed,  fabric →      bodies,  buffers and  runs        loads in
+//!  user wrote   checked geometry,     motions, stages: the  stages,     time
+//!                       clamps, ties  steps    algorithm    knows no
+//!                                              as data      physics
+//!                       rig.observer ◄──── simulate: the loop in time ────► measure ─► output: vtu, csv, png, json, page
+//!               └────────── run: one case from end to end; study: many runs ──────────┘
 //! ```
 //! Elements write the forces on their own corners only, and every node gathers them in a fixed order. Contact pairs change,
 //! so contact adds integers: any order gives the same bits. A case therefore gives the same result on any number of threads.
@@ -35,38 +36,42 @@
 //! |---|---|
 //! | [`error`] | the one error type: every message names its culprit |
 //! | [`kernel`] | what backends share: lanes, elementary functions, positions in quanta, buffers, stages, the text of shaders |
-//! | [`case`] | what a user writes: typed JSON with units, ranges, defaults, schema and overrides |
+//! | [`settings`] | effects, load steps, integration, laws: plain structs with their JSON form |
 //! | [`mesh`] | nodes, blocks of hexahedra, threads, frames (deformed states), surfaces, quality |
-//! | [`fabric`] | from parameters to geometry: yarn sections, the path of the stitch, the cell, the specimen |
-//! | [`materials`] | constitutive laws: energy, first Piola stress, stiffness |
+//! | [`materials`] | constitutive laws: energy, first Piola–Kirchhoff stress, stiffness |
 //! | [`elements`] | hexahedra, beams, bending between beams |
 //! | [`contact`] | search and forces: points on closed surfaces, lines on lines, friction |
 //! | [`dynamics`] | assembly, fibre lines, integration, limit of the time step |
 //! | [`conditions`] | prescribed motion |
+//! | [`scene`] | all that the solver needs, and nothing of how it was written |
 //! | [`plan`] | the scene as buffers and stages; reading it is reading the algorithm |
 //! | [`backend`] | runs stages: the CPU, with threads and registers of any width; a GPU, with the WGSL twins of the kernels |
 //! | [`measure`] | widths, thicknesses, gaps, crossings, zones, tensions, shear force |
 //! | [`schedule`] | load steps as smooth functions of time |
-//! | [`output`] | frames, tables, maps, pictures, pages, checkpoints |
 //! | [`simulate`] | a scene in time: steps, contact searches, energies, guards |
+//! | [`case`] | what a user writes: typed JSON with units, ranges, defaults, schema and overrides |
+//! | [`fabric`] | from the parameters of a fabric to geometry: yarn sections, the path of the stitch, a cell, a cut piece |
+//! | [`output`] | frames, tables, maps, pictures, pages, checkpoints |
+//! | [`rigs`] | test rigs: the cell, bias extension, inline meshes; what each checks, builds, measures and reports |
 //! | [`run`] | a case with its files: what the program calls |
 //! | [`study`] | many runs at once: tables over a folder of scenes, how results differ, what accuracy costs |
 //!
-//! Imports point one way: a module knows only those before it in this list (`tests/structure.rs` checks it).
+//! Imports point one way: a module knows only those before it in this list (`tests/program/structure.rs` checks it).
 //! ```text
-//! error kernel case mesh fabric materials elements contact dynamics conditions plan backend measure schedule output simulate run study
+//! error kernel settings mesh materials elements contact dynamics conditions scene plan backend measure schedule simulate case fabric output rigs run study
 //! ```
 //! Moreover, the backend knows only `error` and `kernel`, and `output` does not know `measure`.
 //!
 //! # Where to add
 //! - **A material**: a file in `materials` with `impl Material` and its twin under `shaders`, an arm in `materials::Law` and in
-//!   [`case::fabric::Material`]. The tests of `materials` compare its stress with differences of its energy.
+//!   [`settings::material::Material`]. The tests of `materials` compare its stress with differences of its energy.
 //! - **An element**: a kernel in `elements` and its twin, its tables and a stage in `plan`, its slots in [`dynamics::assemble`].
 //! - **A contact law**: beside `contact::friction`; it sees one pair with its state and returns a force.
 //! - **An effect**: a flag in [`plan::Active`] that says what in a case calls for it, a const flag of the kernels it changes and the same
-//!   name for `#if` in their twins, a name and how to turn it off in [`run::effects`], a scene with and without it in `tests/effects.rs`.
+//!   name for `#if` in their twins, a name and how to turn it off in [`run::effects`], a scene with and without it in `tests/physics/effects.rs`.
 //! - **A measure**: a file in `measure`, from [`mesh::Mesh`] and [`mesh::frame::Frame`]; a column in [`output::table`].
-//! - **A knob of accuracy**: a row in [`study::accuracy::turns`].
+//! - **A test rig**: a folder in [`rigs`] with `impl Rig`, its piece of fabric in [`case::domain`], an arm in [`rigs::of`] and [`rigs::of_mut`].
+//! - **A knob of accuracy**: a row in [`study::accuracy::variations`].
 //! - **A scene**: a JSON file in `cases/`. `tricot schema` lists every field.
 
 pub mod backend;
@@ -83,7 +88,10 @@ pub mod measure;
 pub mod mesh;
 pub mod output;
 pub mod plan;
+pub mod rigs;
 pub mod run;
+pub mod scene;
 pub mod schedule;
+pub mod settings;
 pub mod simulate;
 pub mod study;

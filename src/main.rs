@@ -5,12 +5,13 @@ use clap::{Parser, Subcommand, ValueEnum};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use tricot::case::read::{Loaded, read};
-use tricot::case::{schema, steps};
+use tricot::case::schema;
 use tricot::error::{Error, Result};
 use tricot::output::directory;
 use tricot::output::picture::View;
+use tricot::rigs::read::{Loaded, read};
 use tricot::run;
+use tricot::settings::integration::Precision;
 use tricot::study::accuracy::{self, accuracy};
 use tricot::study::compare::compare;
 use tricot::study::effects::{self, effects};
@@ -284,7 +285,7 @@ impl From<Machine> for run::Machine {
     }
 }
 
-impl From<Scalar> for steps::Precision {
+impl From<Scalar> for Precision {
     fn from(scalar: Scalar) -> Self {
         match scalar {
             Scalar::F32 => Self::F32,
@@ -377,8 +378,8 @@ fn perform(command: Command) -> Result<Done> {
             let loaded = case.read()?;
             let table = output.unwrap_or_else(|| beside(&case.case, "-effects.csv"));
             let precision = precision.map_or(loaded.case.integration.precision, Into::into);
-            let make = run::make(precision, backend.into(), threads.map(usize::from), "")?;
-            let study = effects(&loaded, &effects::Options { make, only, table, force })?;
+            let config = run::backend_config(precision, backend.into(), threads.map(usize::from), "")?;
+            let study = effects(&loaded, &effects::Options { config, only, table, force })?;
             return Ok(Done { text: study.text, code: if study.interrupted { INTERRUPTED } else { 0 } });
         }
         Command::Study { study: StudyCommand::Step { case, every, confirm } } => {

@@ -1,9 +1,9 @@
 //! Load steps in time: what is prescribed at any moment, as smooth functions, and as the row of one time step.
 
-use crate::case::effects::Effects;
-use crate::case::steps::{Along, Step};
 use crate::kernel::row::Row;
 use crate::measure::shear::gradient;
+use crate::settings::effects::Effects;
+use crate::settings::steps::{Along, Step};
 
 /// The load steps of a case.
 #[derive(Debug, Clone)]
@@ -152,7 +152,7 @@ impl Schedule {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::effects::Damping;
+    use crate::settings::effects::Damping;
 
     #[test]
     fn every_load_step_has_its_damping() {

@@ -21,14 +21,11 @@ pub use stretch::Fibres;
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{Device, Gpu};
-use crate::case::Case;
-use crate::case::domain::{Clamps, Domain};
-use crate::case::steps::Precision;
 use crate::contact::found;
 use crate::contact::penalty::GAPS;
+use crate::contact::skin::{SKIN_APART, SKIN_USED};
 use crate::contact::status;
 use crate::contact::threads::MOST_PAIRS;
-use crate::contact::travel::{SKIN_APART, SKIN_USED};
 use crate::dynamics::time_step;
 use crate::error::{Error, Result};
 use crate::kernel::buffer::{Buffer, Initial};
@@ -37,7 +34,9 @@ use crate::kernel::position::QUANTUM;
 use crate::kernel::row::Row;
 use crate::mesh::Mesh;
 use crate::plan::{self, Capacity, Model};
+use crate::scene::Scene;
 use crate::schedule::{Load, Schedule};
+use crate::settings::integration::Precision;
 use std::sync::Arc;
 use stretch::Stretch;
 
@@ -84,13 +83,11 @@ pub struct Health {
 
 /// A scene on a backend, at a moment.
 pub struct Simulation {
-    pub mesh: Mesh,
+    pub scene: Scene,
     pub model: Model,
     pub schedule: Schedule,
     backend: Box<dyn Backend>,
-    case: Case,
-    friction: f64,
-    make: Make,
+    config: BackendConfig,
     capacity: Capacity,
     /// Time of the current positions, s.
     time: f64,
@@ -124,15 +121,14 @@ pub struct Simulation {
     stress: StressMean,
     /// Half of the work of its motion, which the next look adds, mJ: see [`ledger`].
     owed: [f64; 4],
-    /// Time from which prescribed motion acts, s, and whether it does now.
-    hold_from: f64,
-    holds: bool,
+    /// Number of load steps behind which prescribed motion acts now; all of it in a new backend.
+    acting: usize,
     ready: bool,
 }
 
-/// How to make a backend.
+/// How to config a backend.
 #[derive(Debug, Clone)]
-pub struct Make {
+pub struct BackendConfig {
     pub precision: Precision,
     /// Threads of the CPU; 0 for all cores.
     pub threads: usize,
@@ -141,13 +137,13 @@ pub struct Make {
     pub device: Option<Arc<Device>>,
 }
 
-impl Default for Make {
+impl Default for BackendConfig {
     fn default() -> Self {
         Self { precision: Precision::F32, threads: 0, isa: Isa::best(), device: None }
     }
 }
 
-impl Make {
+impl BackendConfig {
     /// # Errors
     /// A scene that the device cannot hold or compute.
     fn backend(&self, model: &Model) -> Result<Box<dyn Backend>> {
@@ -161,17 +157,6 @@ impl Make {
                 return Err(Error::Unsupported(what.into()));
             }
         })
-    }
-}
-
-/// Time from which the conditions of a case act, s.
-fn hold_from(case: &Case, schedule: &Schedule) -> f64 {
-    match &case.domain {
-        Domain::Specimen(specimen) if specimen.clamps == Clamps::AfterPretension => {
-            let tightening = schedule.phases().iter().find(|phase| phase.name == "pretension");
-            tightening.map_or(0.0, |phase| phase.end)
-        }
-        _ => 0.0,
     }
 }
 
@@ -193,29 +178,26 @@ impl Simulation {
     ///
     /// # Errors
     /// Geometry that cannot be run.
-    pub fn new(case: &Case, friction: f64, mesh: Mesh, make: Make) -> Result<Self> {
-        Self::with_capacity(case, friction, mesh, make, Capacity::default())
+    pub fn new(scene: Scene, config: BackendConfig) -> Result<Self> {
+        Self::with_capacity(scene, config, Capacity::default())
     }
 
     /// A scene at rest at time zero whose contact tables start at a given size; they grow when they must.
     ///
     /// # Errors
     /// Geometry that cannot be run.
-    pub fn with_capacity(case: &Case, friction: f64, mesh: Mesh, make: Make, capacity: Capacity) -> Result<Self> {
-        let model = plan::build(case, friction, &mesh, capacity)?;
-        let backend = make.backend(&model)?;
-        let schedule = Schedule::new(&case.steps, &case.effects);
+    pub fn with_capacity(scene: Scene, config: BackendConfig, capacity: Capacity) -> Result<Self> {
+        let model = plan::build(&scene, capacity)?;
+        let backend = config.backend(&model)?;
+        let schedule = Schedule::new(&scene.steps, &scene.effects);
         Ok(Self {
             gradient_at_search: schedule.load(0.0),
             stretch_at_search: [1.0; 2],
-            stretch: Stretch::of(&mesh),
-            hold_from: hold_from(case, &schedule),
-            holds: true,
+            stretch: Stretch::of(&scene.mesh),
+            acting: usize::MAX,
             schedule,
             backend,
-            case: case.clone(),
-            friction,
-            make,
+            config,
             capacity,
             time: 0.0,
             step: 0,
@@ -236,7 +218,7 @@ impl Simulation {
             stress: StressMean::default(),
             owed: [0.0; 4],
             ready: false,
-            mesh,
+            scene,
             model,
         })
     }
@@ -252,7 +234,7 @@ impl Simulation {
         self.dt
     }
     /// Factor on the time step: below one in a run that has gone back.
-    pub fn share(&self) -> f64 {
+    pub fn step_factor(&self) -> f64 {
         self.share
     }
     /// Contact searches so far.
@@ -288,16 +270,16 @@ impl Simulation {
     fn row(&self, time: f64, dt: f64, before: f64) -> Row<f64> {
         self.schedule.row(time, dt, before, |time| self.stretch.at(time))
     }
-    /// What the scene was made from.
-    pub fn case(&self) -> &Case {
-        &self.case
+    /// Bodies in their reference position.
+    pub fn mesh(&self) -> &Mesh {
+        &self.scene.mesh
     }
     pub fn backend(&self) -> &dyn Backend {
         &*self.backend
     }
     /// Whether a device runs the scene rather than the CPU.
     pub fn on_device(&self) -> bool {
-        self.make.device.is_some()
+        self.config.device.is_some()
     }
     /// Whether the backend still computes.
     ///
@@ -357,7 +339,7 @@ impl Simulation {
     /// First search, first energies, first time step.
     fn begin(&mut self) -> Result<()> {
         self.ready = true;
-        self.dt = self.share * self.case.integration.dt_s.unwrap_or(self.case.integration.dt_max_s);
+        self.dt = self.share * self.scene.integration.dt_s.unwrap_or(self.scene.integration.dt_max_s);
         self.dt_before = self.dt;
         self.search_all()?;
         self.threads_at_rest();
@@ -405,7 +387,7 @@ impl Simulation {
         let (stretch, then) = (self.stretch(), self.stretch_at_search);
         let strained = [0, 1].map(|k| (stretch[k] - then[k]).abs()).into_iter().fold(0.0, f64::max);
         let affine = ((load.angle - self.gradient_at_search.angle).abs() + strained) * AFFINE_REACH;
-        let contact = self.case.effects.contact.as_ref().filter(|_| self.model.active.searches());
+        let contact = self.scene.effects.contact.as_ref().filter(|_| self.model.active.searches());
         let skin = contact.map_or(f64::INFINITY, |c| c.skin_mm);
         let mut left = SKIN_USED * skin - travel - affine;
         let found = self.model.buffers.found.into_iter().flatten();
@@ -438,16 +420,17 @@ impl Simulation {
 
     /// Lets prescribed motion act from its time on, by the masks of its nodes.
     fn hold(&mut self) {
-        let holds = self.time >= self.hold_from * (1.0 - 1e-12);
-        if holds == self.holds {
+        let passed = self.schedule.phases().iter().take_while(|phase| self.time >= phase.end * (1.0 - 1e-12)).count();
+        let acting = if self.model.acts_after.iter().any(|after| *after > passed) { passed } else { usize::MAX };
+        if acting == self.acting {
             return;
         }
-        self.holds = holds;
+        self.acting = acting;
         let Some(buffer) = self.model.buffers.prescribed else { return };
         if let Initial::Uint(all) = &self.model.plan.buffers[buffer.0].initial {
             let mut masked = all.clone();
-            if !holds {
-                masked.chunks_exact_mut(2).for_each(|condition| condition[1] = 0);
+            for (condition, after) in masked.chunks_exact_mut(2).zip(&self.model.acts_after) {
+                condition[1] = if *after <= passed { condition[1] } else { 0 };
             }
             self.backend.set_bytes(buffer, bytemuck::cast_slice(&masked));
         }
@@ -518,8 +501,8 @@ impl Simulation {
 
     /// Moves the state into a plan with larger contact tables.
     fn grow(&mut self, capacity: Capacity) -> Result<()> {
-        let model = plan::build(&self.case, self.friction, &self.mesh, capacity)?;
-        let mut backend = self.make.backend(&model)?;
+        let model = plan::build(&self.scene, capacity)?;
+        let mut backend = self.config.backend(&model)?;
         // found again
         let b = &self.model.buffers;
         let lists: Vec<_> = b.faces.iter().flatten().map(|faces| Some(faces.near)).collect();
@@ -561,7 +544,7 @@ impl Simulation {
         let b = &self.model.buffers;
         let kind =
             b.faces.iter().position(|f| f.is_some_and(|f| [f.keys, f.touches, f.gaps].contains(&Buffer(buffer))));
-        kind.map_or(self.mesh.beams(), |kind| self.model.points[kind].len())
+        kind.map_or(self.scene.mesh.beams(), |kind| self.model.points[kind].len())
     }
 
     fn clear_travel(&mut self, status: &[u32]) {
@@ -586,7 +569,7 @@ impl Simulation {
         self.largest_flow = self.largest_flow.max(flow + self.start_energy.abs()).max(e.output());
         let error = e.output() - self.start_energy - e.input();
         self.health.balance = error / self.largest_flow.max(NOISE);
-        let is_off = self.health.balance.abs() > 0.5 * self.case.integration.energy_tolerance;
+        let is_off = self.health.balance.abs() > 0.5 * self.scene.integration.energy_tolerance;
         self.half_off = is_off.then(|| self.half_off.unwrap_or(self.step));
         self.guards()?;
         self.choose_dt();
@@ -627,7 +610,7 @@ impl Simulation {
     }
 
     fn choose_dt(&mut self) {
-        let integration = &self.case.integration;
+        let integration = &self.scene.integration;
         if let Some(dt) = integration.dt_s {
             self.dt = self.share * dt;
             return;

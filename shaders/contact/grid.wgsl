@@ -20,7 +20,7 @@ fn clear(cell: u32) {
 #endif
 #include "contact/surface"
 #if fill_beams
-#include "contact/bow"
+#include "contact/arc_offset"
 #endif
 
 // Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm, half sizes in the plane, mm (2); then

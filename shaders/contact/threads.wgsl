@@ -14,7 +14,7 @@
 #endif
 #endif
 #include "contact/grid"
-#include "contact/bow"
+#include "contact/arc_offset"
 #include "contact/segments"
 
 #if ROOT

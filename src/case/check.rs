@@ -1,71 +1,60 @@
-//! Checks across fields that need no mesh. Ranges of single numbers are in the schema.
-
-mod cell;
-mod fabric;
-mod inline;
-mod specimen;
+//! Checks across fields that need no mesh, whatever the test rig. Ranges of single numbers are in the schema.
 
 use super::Case;
-use super::domain::Domain;
-use super::origin::Origin;
-use super::steps::{Along, Step};
+use super::provenance::Provenance;
 use crate::error::Result;
+use crate::settings::steps::{Along, Step};
 use std::collections::BTreeMap;
 
-/// Most hexahedra of one case.
-pub const MAX_HEXES: f64 = 5e7;
-/// Most beams of one case.
-pub const MAX_BEAMS: f64 = 1e7;
 /// Most time steps of one case.
 pub const MAX_TIME_STEPS: f64 = 1e9;
-/// Positions are held to ± this, mm.
-pub const MAX_POSITION_MM: f64 = 250.0;
 
-/// The first contradiction in a case whose single values are in range. `origin` names files in messages.
-pub fn check(case: &Case, origin: &Origin) -> Result<()> {
+/// The first contradiction in a case whose single values are in range. `provenance` names files in messages.
+pub fn check(case: &Case, provenance: &Provenance) -> Result<()> {
     if case.title.chars().any(char::is_control) {
-        return Err(origin.error("title", "holds a line break or control character, write one line"));
+        return Err(provenance.error("title", "holds a line break or control character, write one line"));
     }
-    steps(case, origin)?;
-    probes(case, origin)?;
-    match &case.domain {
-        Domain::Cell { warps, wefts } => cell::check(case, *warps, *wefts, origin),
-        Domain::Specimen(specimen) => specimen::check(case, specimen, origin),
-        Domain::Mesh(mesh) => inline::check(case, mesh, origin),
-    }
+    steps(case, provenance)?;
+    probes(case, provenance)
 }
 
 /// Refuses names that are used twice, or that a table cannot hold.
-fn distinct<'a>(names: impl Iterator<Item = (String, &'a String)>, what: &str, origin: &Origin) -> Result<()> {
+pub fn distinct<'a>(
+    names: impl Iterator<Item = (String, &'a String)>,
+    what: &str,
+    provenance: &Provenance,
+) -> Result<()> {
     let mut known = BTreeMap::new();
     for (path, name) in names {
         if name.chars().any(char::is_control) {
-            return Err(origin.error(&path, "holds a line break or control character, write one line"));
+            return Err(provenance.error(&path, "holds a line break or control character, write one line"));
         }
         if name.contains([',', '"']) {
-            return Err(origin.error(&path, "holds a comma or a quote, which tables cannot: leave it out"));
+            return Err(provenance.error(&path, "holds a comma or a quote, which tables cannot: leave it out"));
         }
         if let Some(first) = known.insert(name, path.clone()) {
-            return Err(origin.error(&path, format!("\"{name}\" is the name of {first} too, give each {what} its own")));
+            return Err(
+                provenance.error(&path, format!("\"{name}\" is the name of {first} too, give each {what} its own"))
+            );
         }
     }
     Ok(())
 }
 
 /// Places of probes that the case itself shows to be none.
-fn probes(case: &Case, origin: &Origin) -> Result<()> {
+fn probes(case: &Case, provenance: &Provenance) -> Result<()> {
     let probes = case.output.probes.iter().enumerate();
-    distinct(probes.map(|(i, probe)| (format!("output.probes.{i}.name"), &probe.name)), "probe", origin)
+    distinct(probes.map(|(i, probe)| (format!("output.probes.{i}.name"), &probe.name)), "probe", provenance)
 }
 
-fn steps(case: &Case, origin: &Origin) -> Result<()> {
+fn steps(case: &Case, provenance: &Provenance) -> Result<()> {
     let mut tightened = None;
     for (i, step) in case.steps.iter().enumerate() {
         if let Step::Pretension { .. } = step
             && let Some(first) = tightened.replace(i)
         {
             let message = format!("the stitch is tightened by steps.{first} already, keep one pretension step");
-            return Err(origin.error(&format!("steps.{i}"), message));
+            return Err(provenance.error(&format!("steps.{i}"), message));
         }
     }
     let (mut angle, mut moved) = (0.0, 0.0);
@@ -77,20 +66,16 @@ fn steps(case: &Case, origin: &Origin) -> Result<()> {
         };
         if *now == next {
             let message = format!("{next} is {what} already: give another one, or use hold");
-            return Err(origin.error(&format!("steps.{i}.{field}"), message));
+            return Err(provenance.error(&format!("steps.{i}.{field}"), message));
         }
         *now = next;
     }
     let mut along = [Along::Held; 2];
     for (i, step) in case.steps.iter().enumerate() {
         let Step::Stretch { warp, weft, .. } = step else { continue };
-        if !matches!(case.domain, Domain::Cell { .. }) {
-            let message = "only a cell has a stretch of its own: use move, with conditions on nodes";
-            return Err(origin.error(&format!("steps.{i}"), message));
-        }
         if along == [*weft, *warp] {
             let message = "both directions are so already: say what changes in warp or weft, or use hold";
-            return Err(origin.error(&format!("steps.{i}"), message));
+            return Err(provenance.error(&format!("steps.{i}"), message));
         }
         along = [*weft, *warp];
     }
@@ -106,12 +91,12 @@ fn steps(case: &Case, origin: &Origin) -> Result<()> {
              raise it or shorten the steps",
             total / dt
         );
-        return Err(origin.error(&path, message));
+        return Err(provenance.error(&path, message));
     }
     let shortest = case.steps.iter().map(Step::time).fold(f64::INFINITY, f64::min);
     if case.integration.dt_s.is_some() && dt > shortest {
         let message = format!("{dt:e} s is longer than the shortest load step, {shortest:e} s: lower it");
-        return Err(origin.error(&path, message));
+        return Err(provenance.error(&path, message));
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! What a user says about the piece of fabric that is simulated, and how finely.
 
-use super::fabric::Material;
+use crate::settings::material::Material;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -9,16 +9,7 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Domain {
     /// A periodic cell of whole repeats: x spans `warps` warp pitches, y spans `wefts` weft pitches.
-    Cell {
-        /// Number of warp yarns, at least 2. Default 2.
-        #[serde(default = "warps")]
-        #[schemars(range(min = 2, max = 2000))]
-        warps: usize,
-        /// Number of weft yarns: even (a tricot repeats after two courses), at least 2. Default 4.
-        #[serde(default = "wefts")]
-        #[schemars(range(min = 2, max = 2000))]
-        wefts: usize,
-    },
+    Cell(Cell),
     /// A rectangle cut at an angle out of the fabric and pulled apart: the bias-extension test.
     Specimen(Specimen),
     /// A mesh written out in the case, for verification scenes.
@@ -35,23 +26,23 @@ impl InlineThread {
     }
 }
 
-impl Domain {
-    /// Largest displacement that is prescribed, mm.
-    pub fn reach_mm(&self) -> f64 {
-        let size = |d: &[f64; 3]| libm::sqrt(d.iter().map(|c| c * c).sum());
-        match self {
-            Self::Cell { .. } => 0.0,
-            Self::Specimen(specimen) => specimen.displacement_mm,
-            Self::Mesh(inline) => inline.conditions.iter().map(|c| size(&c.displacement_mm)).fold(0.0, f64::max),
-        }
-    }
+/// A periodic cell of whole repeats: x spans `warps` warp pitches, y spans `wefts` weft pitches.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(inline)]
+pub struct Cell {
+    /// Number of warp yarns, at least 2. Default 2.
+    #[schemars(range(min = 2, max = 2000))]
+    pub warps: usize,
+    /// Number of weft yarns: even (a tricot repeats after two courses), at least 2. Default 4.
+    #[schemars(range(min = 2, max = 2000))]
+    pub wefts: usize,
 }
 
-fn warps() -> usize {
-    2
-}
-fn wefts() -> usize {
-    4
+impl Default for Cell {
+    fn default() -> Self {
+        Self { warps: 2, wefts: 4 }
+    }
 }
 
 /// A rectangle of fabric centred at the origin, its length along x, clamped at both ends. Nothing holds its long edges.

@@ -2,30 +2,31 @@
 
 pub mod accuracy;
 pub mod check;
-pub mod conform;
 pub mod defaults;
 pub mod differences;
 pub mod domain;
-pub mod effects;
 pub mod expect;
 pub mod fabric;
-pub mod nearest;
-pub mod origin;
+pub mod output;
 pub mod overrides;
 pub mod parse;
-pub mod read;
+pub mod provenance;
 pub mod schema;
-pub mod steps;
+pub mod suggest;
+pub mod validate;
 
+use crate::error::{Error, Result};
+use crate::settings::effects::Effects;
+use crate::settings::integration::Integration;
+use crate::settings::steps::Step;
 use accuracy::Accuracy;
 use domain::{Domain, Resolution};
-use effects::Effects;
 use expect::Expect;
 use fabric::Fabric;
+use output::Output;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
-use steps::{Integration, Output, Step};
 
 /// A case: one run of `tricot`. Units: mm, N, s, tonne, MPa.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -71,4 +72,20 @@ pub enum FabricSource {
     File(PathBuf),
     /// The fabric itself.
     Inline(Box<Fabric>),
+}
+
+impl Case {
+    /// The fabric, which has been read from its file if the case names one.
+    ///
+    /// # Errors
+    /// A case without a fabric.
+    pub fn fabric(&self) -> Result<&Fabric> {
+        match &self.fabric {
+            Some(FabricSource::Inline(fabric)) => Ok(fabric),
+            Some(FabricSource::File(path)) => {
+                Err(Error::case("fabric", format!("{} has not been read: give the fabric itself", path.display())))
+            }
+            None => Err(Error::case("fabric", "is missing: give a fabric file or the fabric itself")),
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! `--set path=value`: changes to a case from the command line.
 
 use super::schema::Shape;
-use super::{conform::brief, nearest, parse};
+use super::{parse, suggest, validate::brief};
 use crate::error::{Error, Result};
 use serde_json::{Map, Value};
 
@@ -40,7 +40,7 @@ impl Override {
                 Value::Array(items) => (self.entry(items, name, &parent)?, items_of(&forms)),
                 Value::Object(fields) => {
                     let Some(field) = forms.iter().find_map(|form| form.field(name)) else {
-                        let allowed = nearest::advice(name, forms.iter().flat_map(Shape::names));
+                        let allowed = suggest::advice(name, forms.iter().flat_map(Shape::names));
                         return Err(self.error(format!("no `{name}` {}; {allowed}", inside(&parent))));
                     };
                     let last = depth + 1 == names.len();

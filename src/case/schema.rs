@@ -1,4 +1,4 @@
-//! JSON Schema of a case and of a fabric file. Every range that [`super::conform`] checks is written here, by way of the
+//! JSON Schema of a case and of a fabric file. Every range that [`super::validate`] checks is written here, by way of the
 //! attributes on the types, and nowhere else.
 
 use super::{Case, fabric::Fabric};

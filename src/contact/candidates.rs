@@ -2,7 +2,7 @@
 //!
 //! A list is sorted by body and lateral image, then by face, so that it does not depend on the order in which the grid lists its
 //! items, and a body's faces follow each other. It holds no state but how often it was made: what touches is known by its body.
-//! Carriers near nothing that has moved relative to them (see [`super::travel`]) keep their lists.
+//! Carriers near nothing that has moved relative to them (see [`super::skin`]) keep their lists.
 
 use super::grid::{BOX, Moved, SLAB, absolute, cell_index, cells, has_moved, inverse, motion, pull_back, stretch};
 use super::surface::{CARRIED, POINT, Surface, entry, of_coded};

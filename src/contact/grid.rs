@@ -3,9 +3,9 @@
 //!
 //! Cells are taken in the pulled-back plane F̄⁻¹x, where the periodic cell keeps its rectangle; a distance ρ in space is at
 //! most ρ |row of F̄⁻¹| along an axis there. A cell lists its items in any order: what is chosen from them does not depend on it.
-//! Boxes tell how far their items have moved since everything was last searched (see [`super::travel`]).
+//! Boxes tell how far their items have moved since everything was last searched (see [`super::skin`]).
 
-use super::bow::Bows;
+use super::arc_offset::OffsetLines;
 use super::surface::{FACE, Surface, of_coded};
 use super::{Params, status};
 use crate::kernel::lane::{Lane, Real};
@@ -42,7 +42,7 @@ const SLAB_BEFORE: usize = 5;
 /// Of beams, where those of slabs are.
 pub const ENDS: usize = 3;
 pub const BEAMS: usize = 4;
-/// See [`super::bow`].
+/// See [`super::arc_offset`].
 pub const NEIGHBOURS: usize = 5;
 pub const SHARES: usize = 6;
 const BEAM_BEFORE: usize = 7;
@@ -319,11 +319,11 @@ impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
         let inverse = grid.inverse;
         let displacement = Displacements::new(io, QUANTA, REMAINDER);
         let (ends, beams) = (io.uints(ENDS), io.scalars(BEAMS));
-        let bows = Bows { neighbours: io.uints(NEIGHBOURS), shares: io.scalars(SHARES) };
+        let offsets = OffsetLines { neighbours: io.uints(NEIGHBOURS), shares: io.scalars(SHARES) };
         let reach = L::Scalar::from_f64(f64::from(2.0 * grid.params.thread_radius + grid.params.skin));
         for item in items {
             let beam = item - grid.params.slabs as usize;
-            let piece = bows.piece::<PERIODIC>(beams, ends, beam, &displacement, &io.row.gradient);
+            let piece = offsets.piece::<PERIODIC>(beams, ends, beam, &displacement, &io.row.gradient);
             let mut bounds = Bounds::new();
             piece.now.into_iter().for_each(|end| bounds.grow(&inverse, end));
             let (first, last) = (ends[2 * beam] as usize, ends[2 * beam + 1] as usize);

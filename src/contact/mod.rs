@@ -4,24 +4,24 @@
 //!
 //! Yarns have a closed `surface` of `face`s. `grid` sorts slabs of faces and beams into cells, `candidates` lists the faces near each
 //! beam and each node of a yarn, and every step `penalty` adds the forces of the listed faces on the points that these carry,
-//! which `arc` lays along beams. `threads` does the same for pairs of beams: `bow` lays their lines, and `segments` integrates
+//! which `arc` lays along beams. `threads` does the same for pairs of beams: `arc_offset` lays their lines, and `segments` integrates
 //! along them. Forces and contact stiffness are added as integers, so
 //! their sum does not depend on the order, and the forces of a pair cancel exactly.
 
 pub mod arc;
-pub mod bow;
+pub mod arc_offset;
 pub mod candidates;
 pub mod face;
 pub mod friction;
 pub mod grid;
 pub mod penalty;
 pub mod segments;
+pub mod skin;
 pub mod slip;
 pub mod sums;
 pub mod surface;
 pub mod threads;
 pub mod tie;
-pub mod travel;
 
 use crate::kernel::lane::Real;
 use bytemuck::{Pod, Zeroable};

@@ -1,5 +1,5 @@
 //! Contact of beams with beams: which are near, and every step the forces of those that touch, from the line of one thread integrated
-//! over that of the other (see [`super::segments`] and [`super::bow`]), with damping and friction at the point where these act.
+//! over that of the other (see [`super::segments`] and [`super::arc_offset`]), with damping and friction at the point where these act.
 //!
 //! A pair is two beams; the one with the lower number integrates over the other. The pairs of a beam with the beams of one thread that
 //! follow each other are a chain: each takes off the joint with the one before it if that one is in the chain too.
@@ -11,7 +11,7 @@
 //! A pair with a gap is left alone until the gap can have closed, as in [`super::penalty`]: points of lines move at most as fast as
 //! nodes times the sum of their weights.
 
-use super::bow::{Bows, Piece};
+use super::arc_offset::{OffsetLines, Piece};
 use super::friction::slide;
 use super::grid::{BOX, MOTION, absolute, cell_index, cells, has_moved, inverse, pull_back};
 use super::segments::{Push, Segments};
@@ -38,7 +38,7 @@ pub const BEAMS: usize = 1;
 pub const REFERENCE: usize = 2;
 pub const QUANTA: usize = 3;
 pub const REMAINDER: usize = 4;
-/// See [`super::bow`].
+/// See [`super::arc_offset`].
 pub const NEIGHBOURS: usize = 5;
 pub const SHARES: usize = 6;
 
@@ -51,7 +51,7 @@ pub struct Force<const FRICTION: bool, const PERIODIC: bool>;
 struct Scene<'a, R, const PERIODIC: bool> {
     ends: &'a [u32],
     beams: &'a [R],
-    bows: Bows<'a, R>,
+    offsets: OffsetLines<'a, R>,
     reference: Lattice<'a>,
     displacement: Displacements<'a, R>,
     gradient: &'a [[R; 3]; 3],
@@ -65,7 +65,7 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
         Self {
             ends: io.uints(ENDS),
             beams: io.scalars(BEAMS),
-            bows: Bows { neighbours: io.uints(NEIGHBOURS), shares: io.scalars(SHARES) },
+            offsets: OffsetLines { neighbours: io.uints(NEIGHBOURS), shares: io.scalars(SHARES) },
             reference: Lattice::new(io, REFERENCE),
             displacement: Displacements::new(io, QUANTA, REMAINDER),
             gradient: &io.row.gradient,
@@ -77,7 +77,7 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
     /// The piece of the line of a beam.
     #[inline(always)]
     fn piece(&self, beam: usize) -> Piece<R> {
-        self.bows.piece::<PERIODIC>(self.beams, self.ends, beam, &self.displacement, self.gradient)
+        self.offsets.piece::<PERIODIC>(self.beams, self.ends, beam, &self.displacement, self.gradient)
     }
 
     /// The pieces of beam `a`, which is known, and of `b` in an image, in the reference and now.
@@ -99,8 +99,8 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
     /// Whether beam `a` takes the joint at the first end of `b` off: where it is a pair with the beam before `b` too.
     #[inline(always)]
     fn owns(&self, a: usize, b: usize, image: [i32; 2]) -> bool {
-        let before = self.bows.before(b, image);
-        before.is_some_and(|(before, image)| before > a && !self.bows.are_near(a, before, image, self.self_arc))
+        let before = self.offsets.before(b, image);
+        before.is_some_and(|(before, image)| before > a && !self.offsets.are_near(a, before, image, self.self_arc))
     }
 }
 
@@ -225,7 +225,7 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
                     let place = keys[..count].iter().take_while(|known| **known < key).count();
                     let is_known = place < count && keys[place] == key;
                     if is_known
-                        || self.scene.bows.are_near(beam, other, image, self.scene.self_arc)
+                        || self.scene.offsets.are_near(beam, other, image, self.scene.self_arc)
                         || !self.is_near(beam, piece, other, image)
                     {
                         continue;
@@ -389,11 +389,11 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
     #[inline(always)]
     fn can_touch(&self, beam: usize, keys: &[u32], states: &mut [R]) -> bool {
         let zero = R::from_f64(0.0);
-        let weights = self.scene.bows.most_weights(beam);
+        let weights = self.scene.offsets.most_weights(beam);
         let mut can_touch = false;
         for (key, state) in keys.iter().zip(states.chunks_exact_mut(slot_state(FRICTION))) {
             if state[0] < zero {
-                let mean = R::from_f64(0.5) * (weights + self.scene.bows.most_weights(of_key(*key).0));
+                let mean = R::from_f64(0.5) * (weights + self.scene.offsets.most_weights(of_key(*key).0));
                 state[0] = state[0] + self.row.approach * mean * self.elapsed + self.growth;
             }
             can_touch |= !(state[0] < zero);
@@ -441,10 +441,10 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
         };
         sum[SUM_ENERGY] = sum[SUM_ENERGY] + push.energy;
         sum[SUM_RADIUS] = sum[SUM_RADIUS] + push.growth * self.growth;
-        let bows = &self.scene.bows;
+        let offsets = &self.scene.offsets;
         let pair = Pair {
-            nodes: [beam, other].map(|beam| bows.nodes(self.scene.ends, beam)),
-            weights: [beam, other].map(|beam| bows.weights(beam)),
+            nodes: [beam, other].map(|beam| offsets.nodes(self.scene.ends, beam)),
+            weights: [beam, other].map(|beam| offsets.weights(beam)),
             strengths,
             rest,
         };
@@ -463,7 +463,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
             add_virial(sum, push.others[1], add(pair.rest.start, pair.rest.other));
         }
         pair.add_forces(self.forces, self.flags, real(self.params.force_quantum), &push);
-        let most_weights = bows.most_weights(beam) + bows.most_weights(other);
+        let most_weights = offsets.most_weights(beam) + offsets.most_weights(other);
         pair.add_rows(self.stiffness, real(self.params.stiffness_quantum), &push, most_weights);
         raise(&self.flags[status::PENETRATION[2]], depth);
         true

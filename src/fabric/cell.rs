@@ -18,7 +18,7 @@ pub fn build(case: &Case, fabric: &Fabric, warps: usize, wefts: usize) -> Result
     let layout = Layout::new(fabric)?;
     let [px, py] = layout.pitch;
     let period = [quantised(warps as f64 * px), quantised(wefts as f64 * py)];
-    let mut mesh = Mesh { period: Some(period), ..Mesh::default() };
+    let mut mesh = Mesh { period: Some(period), friction: fabric.friction, ..Mesh::default() };
     for i in 0..warps {
         add_yarn(&mut mesh, Ply::Warp, i, &layout, &fabric.warp, resolution)?;
     }

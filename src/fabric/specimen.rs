@@ -25,8 +25,6 @@ const FEWEST_COLUMNS: usize = 3;
 const FEWEST_SLICES: usize = 2;
 /// Length over which fibre lines adapt to a cut, in widths of the yarn.
 const BLEND: f64 = 2.0;
-/// Nodes this close to the end of the free length are in the clamp, mm.
-const TOLERANCE: f64 = 1e-3;
 
 /// Builds a specimen.
 pub fn build(case: &Case, fabric: &Fabric, specimen: &Specimen) -> Result<Mesh> {
@@ -42,7 +40,7 @@ pub fn build(case: &Case, fabric: &Fabric, specimen: &Specimen) -> Result<Mesh> 
     require(nodes <= MOST_NODES, "resolution", || {
         format!("asks for {nodes:.1e} nodes, more than {MOST_NODES:.0e}; coarsen it or choose a smaller specimen")
     })?;
-    let mut mesh = Mesh::default();
+    let mut mesh = Mesh { friction: fabric.friction, ..Mesh::default() };
     let [warp, weft] = [(Ply::Warp, &fabric.warp), (Ply::Weft, &fabric.weft)];
     for (ply, yarn) in [warp, weft] {
         add_ply(&mut mesh, &cut, &layout, ply, yarn, resolution)?;
@@ -50,13 +48,6 @@ pub fn build(case: &Case, fabric: &Fabric, specimen: &Specimen) -> Result<Mesh> 
     add_threads(&mut mesh, &cut, &layout, fabric, resolution)?;
     check::contact(case, fabric, &mesh)?;
     Ok(mesh)
-}
-
-/// Nodes in the clamp that is held, at x < 0, and in the one that is moved.
-pub fn clamped(specimen: &Specimen, mesh: &Mesh) -> [Vec<usize>; 2] {
-    let end = 0.5 * specimen.length_mm - TOLERANCE;
-    let nodes = |side: f64| (0..mesh.nodes.len()).filter(|&n| side * mesh.nodes[n][0] >= end).collect();
-    [nodes(-1.0), nodes(1.0)]
 }
 
 /// The rectangle, and the fabric in it.

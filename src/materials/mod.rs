@@ -3,8 +3,8 @@
 pub mod charmetant;
 pub mod neo_hookean;
 
-use crate::case::fabric::Material as Choice;
 use crate::kernel::lane::Lane;
+use crate::settings::material::Material as Choice;
 
 /// A 3 × 3 tensor, rows first.
 pub type Tensor<L> = [[L; 3]; 3];

@@ -6,8 +6,8 @@
 
 use super::vector::{norm, sub};
 use super::{Block, Mesh, Ply, Seen, Thread};
-use crate::case::fabric::Material;
 use crate::error::{Error, Result};
+use crate::settings::material::Material;
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

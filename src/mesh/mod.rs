@@ -1,7 +1,7 @@
 //! Nodes, blocks of hexahedra (yarns) and threads of beams. Straight extrusions keep their structure: nodes are numbered
 //! along the fibre first, so that the corners of neighbouring hexahedra are contiguous and every fibre line is a range.
 
-use crate::case::fabric::Material;
+use crate::settings::material::Material;
 
 pub mod centre;
 pub mod clearance;
@@ -38,6 +38,8 @@ pub struct Mesh {
     pub blocks: Vec<Block>,
     /// Threads.
     pub threads: Vec<Thread>,
+    /// Coulomb friction coefficient of every contact.
+    pub friction: f64,
 }
 
 /// Which ply a yarn belongs to.

@@ -3,7 +3,6 @@
 use super::clearance::{Clearance, thread_thread, thread_yarn};
 use super::quality::{ArealMass, areal_mass, length, scaled_jacobian};
 use super::{Mesh, Part, Ply, linking};
-use crate::case::Case;
 use std::fmt;
 
 /// Points along a beam at which its distance to yarns is measured.
@@ -36,12 +35,12 @@ pub struct Report {
 }
 
 /// Measures a mesh.
-pub fn report(mesh: &Mesh, case: &Case) -> Report {
+pub fn report(mesh: &Mesh, title: &str) -> Report {
     let count = |ply: Ply| mesh.blocks.iter().filter(|b| b.ply == ply).count();
     let total = |part: Option<Part>| mesh.threads.iter().map(|t| length(mesh, t, part)).sum();
     let links = linking::links(mesh);
     Report {
-        title: case.title.clone(),
+        title: title.to_owned(),
         nodes: mesh.nodes.len(),
         hexes: mesh.hexes(),
         beams: mesh.beams(),

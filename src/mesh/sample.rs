@@ -2,7 +2,7 @@
 
 use super::frame::Frame;
 use super::{Block, Mesh, Part, Ply, Thread};
-use crate::case::fabric::Material;
+use crate::settings::material::Material;
 use std::f64::consts::TAU;
 
 /// Slices of a yarn of [`plies`].

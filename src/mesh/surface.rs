@@ -147,8 +147,8 @@ fn corner_shares([a, b, c, d]: [[f64; 3]; 4]) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::fabric::Material;
     use crate::mesh::Ply;
+    use crate::settings::material::Material;
 
     fn block(columns: usize, layers: usize) -> Block {
         Block {

@@ -22,6 +22,7 @@ pub mod map;
 pub mod page;
 pub mod picture;
 pub mod raster;
+pub mod results;
 pub mod scatter;
 pub mod scene;
 pub mod table;

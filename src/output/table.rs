@@ -93,6 +93,25 @@ pub const STITCHES: &[&str] = &[
     "underlap_slack_share",
 ];
 
+/// Columns of `stress.csv`: components of V P̄/A₀, then stretches and membrane forces along the fibre directions x and y.
+pub const STRESS: &[&str] = &[
+    "time_s",
+    "shear_angle_deg",
+    "p_xx_n_per_mm",
+    "p_xy_n_per_mm",
+    "p_xz_n_per_mm",
+    "p_yx_n_per_mm",
+    "p_yy_n_per_mm",
+    "p_yz_n_per_mm",
+    "p_zx_n_per_mm",
+    "p_zy_n_per_mm",
+    "p_zz_n_per_mm",
+    "weft_stretch",
+    "warp_stretch",
+    "weft_membrane_n_per_mm",
+    "warp_membrane_n_per_mm",
+];
+
 /// Columns of `shear.csv`: effective angles at all crossings of warp and weft, and slip of the plies there.
 pub const SHEAR: &[&str] = &[
     "time_s",

@@ -4,11 +4,9 @@ use super::conditions::Conditions;
 use super::effects::Active;
 use super::surfaces::{Carried, Surfaces};
 use super::threads::Threads;
-use super::ties::Ties;
 use super::{Builder, Capacity, ContactPoint, after, beside, coded, own, thickness, waiting};
-use crate::case::effects::Contact;
 use crate::contact::found::NEVER;
-use crate::contact::travel::SKIN_APART;
+use crate::contact::skin::SKIN_APART;
 use crate::contact::{EMPTY, Params, candidates, grid, penalty, slot_state, sums, surface, threads, tie};
 use crate::elements::beam2;
 use crate::error::Result;
@@ -16,6 +14,8 @@ use crate::kernel::buffer::{Buffer, Initial, Kind};
 use crate::kernel::position::quanta;
 use crate::kernel::stage::{Access, Code, Stage, flagged};
 use crate::mesh::Mesh;
+use crate::scene::Tie;
+use crate::settings::effects::Contact;
 
 /// Buffers of contact with the faces of yarns.
 #[derive(Debug, Clone, Copy)]
@@ -60,11 +60,10 @@ pub(super) struct ContactParts {
 pub(super) struct ContactScene<'a> {
     pub chosen: &'a Contact,
     pub active: Active,
-    pub friction: f64,
     pub mesh: &'a Mesh,
     pub threads: &'a Threads,
     pub conditions: &'a Conditions,
-    pub ties: Ties,
+    pub ties: &'a [Tie],
     pub capacity: Capacity,
     pub reference: Buffer,
     pub quanta: Buffer,
@@ -155,12 +154,12 @@ impl ContactScene<'_> {
             let search = Search { counts, lists, boxes };
             b.plan.search.push(after::<grid::Clear>("clear grid", cells, 4096, &[], &[(counts, own(1, 1))], params));
             let tables = (slabs > 0).then(|| self.slabs(b, &search, &surfaces, params));
-            let bows = (paired > 0).then(|| {
+            let offsets = (paired > 0).then(|| {
                 let neighbours = b.indices("neighbours of beams", self.threads.neighbours.clone());
-                [neighbours, b.table("shares in bows", self.threads.shares.clone())]
+                [neighbours, b.table("shares in offsets", self.threads.shares.clone())]
             });
-            if let Some(bows) = bows {
-                self.beams_to_grid(b, &search, slabs, bows, params);
+            if let Some(offsets) = offsets {
+                self.beams_to_grid(b, &search, slabs, offsets, params);
             }
             let mut waits = true;
             for (kind, carried) in surfaces.carried.iter().enumerate().filter(|(_, carried)| !carried.points.is_empty())
@@ -169,7 +168,7 @@ impl ContactScene<'_> {
                     tables.map(|tables| self.faces(b, &search, tables, (kind == 0, carried), sums, (params, waits)));
                 waits = false;
             }
-            pairs = bows.map(|bows| self.pairs(b, &search, bows, sums, params));
+            pairs = offsets.map(|offsets| self.pairs(b, &search, offsets, sums, params));
         }
         let ties = self.active.ties.then(|| self.tied(b, sums, params));
         let points = surfaces.carried.map(|carried| carried.contact_points);
@@ -205,9 +204,9 @@ impl ContactScene<'_> {
     }
 
     /// Threads in the grid, behind the slabs of yarns.
-    fn beams_to_grid(&self, b: &mut Builder, search: &Search, slabs: usize, bows: [Buffer; 2], params: Params) {
+    fn beams_to_grid(&self, b: &mut Builder, search: &Search, slabs: usize, offsets: [Buffer; 2], params: Params) {
         let beams = self.threads.beams();
-        let mut reads = [&self.place()[..], &[self.ends, self.beams], &bows].concat();
+        let mut reads = [&self.place()[..], &[self.ends, self.beams], &offsets].concat();
         reads.extend(self.before);
         let kernel = flagged!(grid::FillBeams; self.active.periodic);
         let stage = coded(kernel, "threads to grid", beams, 32, &reads, &self.to_grid(search), params);
@@ -274,7 +273,7 @@ impl ContactScene<'_> {
         &self,
         b: &mut Builder,
         search: &Search,
-        bows: [Buffer; 2],
+        offsets: [Buffer; 2],
         (force, stiffness): (Buffer, Buffer),
         params: Params,
     ) -> PairBuffers {
@@ -283,7 +282,7 @@ impl ContactScene<'_> {
         let keys = b.add("beam pairs", Kind::Uint, slots * beams, true, Initial::Uint(vec![EMPTY; slots * beams]));
         let state = b.add("beam pair state", Kind::Scalar, size * slots * beams, true, Initial::Zero);
         let sums = b.scratch("beam pair sums", sums::sums(friction, periodic) * beams);
-        let common = [&[self.ends, self.beams][..], &self.place(), &bows].concat();
+        let common = [&[self.ends, self.beams][..], &self.place(), &offsets].concat();
         let reads = [&common[..], &[search.counts, search.lists, search.boxes]].concat();
         let found = b.add("when pairs were found", Kind::Uint, beams, true, Initial::Uint(vec![NEVER; beams]));
         let keys_own = (keys, own(1, slots));
@@ -308,9 +307,11 @@ impl ContactScene<'_> {
 
     /// Nodes of cut threads that are held; energies and number of ties.
     fn tied(&self, b: &mut Builder, (force, stiffness): (Buffer, Buffer), params: Params) -> (Buffer, usize) {
-        let count = self.ties.count();
-        let nodes = b.indices("ties", self.ties.nodes.clone());
-        let values = b.table("tie values", self.ties.values.clone());
+        let count = self.ties.len();
+        let at = |tie: &Tie| std::iter::once(tie.node).chain(tie.corners).map(|node| node as u32).collect::<Vec<_>>();
+        let nodes = b.indices("ties", self.ties.iter().flat_map(at).collect());
+        let stiffness_of = |tie: &Tie| tie.weights.into_iter().chain([self.chosen.tie_n_mm]).collect::<Vec<_>>();
+        let values = b.table("tie values", self.ties.iter().flat_map(stiffness_of).collect());
         let energy = b.scratch("tie energies", count);
         let reads = [nodes, values, self.quanta, self.remainder];
         let writes = [(energy, own(1, 1)), (force, Access::Atomic), (stiffness, Access::Atomic), self.status()];
@@ -355,7 +356,7 @@ impl ContactScene<'_> {
             origin: origin.map(|x| x as f32),
             cell: [0, 1].map(|k| (size[k] / f64::from(cells[k])) as f32),
             skin: self.chosen.skin_mm as f32,
-            friction: if self.active.friction { self.friction as f32 } else { 0.0 },
+            friction: if self.active.friction { self.mesh.friction as f32 } else { 0.0 },
             tangential: self.chosen.tangential_ratio as f32,
             damping: self.chosen.damping_ratio as f32,
             // a pair may reach 2²⁷ quanta, a node the sum of sixteen such pairs; pieces of threads push with 0.39 k L r at most

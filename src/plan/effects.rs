@@ -1,10 +1,10 @@
-//! Which effects a scene has: what its case asks for, as far as something in the scene calls for it.
+//! Which effects a scene has: what its settings ask for, as far as something in it calls for them.
 
-use crate::case::Case;
-use crate::case::steps::Step;
 use crate::dynamics::fibre_lines::Group;
 use crate::dynamics::integrate::Works;
 use crate::mesh::Mesh;
+use crate::scene::Scene;
+use crate::settings::steps::Step;
 
 /// The effects of a plan. One that is not here has no buffer, no stage and no text in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,21 +27,22 @@ pub struct Active {
 }
 
 impl Active {
-    /// Effects of a case with a friction coefficient on its mesh, whose fibre lines are known, and whether threads are tied.
-    pub fn new(case: &Case, friction: f64, mesh: &Mesh, lines: &[Group], ties: bool) -> Self {
-        let effects = &case.effects;
+    /// Effects of a scene whose fibre lines are known.
+    pub fn new(scene: &Scene, lines: &[Group]) -> Self {
+        let Scene { mesh, effects, .. } = scene;
         let (yarns, threads) = (mesh.blocks.len(), mesh.threads.len());
         let contact = effects.contact.as_ref();
         let thread_yarn = contact.is_some_and(|c| c.thread_yarn && yarns > 0 && threads > 0);
         let yarn_yarn = contact.is_some_and(|c| c.yarn_yarn && yarns > 1);
         let thread_thread = contact.is_some_and(|c| c.thread_thread && beams_can_meet(mesh));
         let touches = thread_yarn || yarn_yarn || thread_thread;
-        let tightens = case.steps.iter().any(|step| matches!(step, Step::Pretension { .. }));
+        let ties = contact.is_some() && !scene.ties.is_empty();
+        let tightens = scene.steps.iter().any(|step| matches!(step, Step::Pretension { .. }));
         Self {
             thread_yarn,
             yarn_yarn,
             thread_thread,
-            friction: touches && friction > 0.0 && contact.is_some_and(|c| c.friction),
+            friction: touches && mesh.friction > 0.0 && contact.is_some_and(|c| c.friction),
             bending: effects.bending && mesh.threads.iter().any(|t| t.bending > 0.0 && t.beams() > 1),
             thermal: tightens && mesh.threads.iter().any(|t| t.thermal_strain != 0.0),
             gravity: effects.gravity_mm_s2.is_some_and(|g| g != [0.0; 3]),

@@ -14,12 +14,10 @@ mod shapes;
 mod solids;
 mod surfaces;
 mod threads;
-mod ties;
 mod totals;
 
-use crate::case::Case;
 use crate::conditions::prescribed::{self, Prescribed};
-use crate::contact::{penalty, slot_state, status, travel};
+use crate::contact::{penalty, skin, slot_state, status};
 use crate::dynamics::assemble::{self, Assemble};
 use crate::dynamics::fibre_lines::{self, FibreLines};
 use crate::dynamics::integrate::{self, Integrate};
@@ -32,17 +30,15 @@ use crate::kernel::position::quanta;
 use crate::kernel::stage::{Access, Code, Kernel, Plan, Stage, flagged};
 use crate::mesh::Mesh;
 use crate::mesh::centre::centred;
+use crate::scene::Scene;
 use bytemuck::Pod;
 use conditions::Conditions;
-pub use conditions::{Grip, grips};
 use contact::ContactScene;
 pub use contact::FaceBuffers;
 pub use effects::Active;
 use hexes::HexBuffers;
 use solids::Solids;
 use threads::Threads;
-use ties::Ties;
-pub use ties::tied;
 pub use totals::{Largest, Sums, Totals};
 
 /// A plan, and what the host must know to drive it and to understand what it computes.
@@ -74,6 +70,8 @@ pub struct Model {
     pub slot_state: usize,
     /// Largest share of the smallest contact radius or yarn thickness, mm, for guards.
     pub limits: Limits,
+    /// Number of load steps behind which each prescribed node is, in the order of their table.
+    pub acts_after: Vec<usize>,
 }
 
 /// A contact point.
@@ -233,22 +231,20 @@ fn own(planes: usize, stride: usize) -> Access {
     Access::Own { planes, stride }
 }
 
-/// The plan of a case on its mesh.
+/// The plan of a scene.
 ///
 /// # Errors
-/// Geometry that cannot be run: inverted elements, conditions without nodes.
-pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Result<Model> {
-    // boxes of conditions and clamps are where the user said
-    let conditions = Conditions::new(case, mesh)?;
-    let mesh = &*centred(mesh);
-    let effects = &case.effects;
+/// Geometry that cannot be run: inverted elements, motions that contradict each other.
+pub fn build(scene: &Scene, capacity: Capacity) -> Result<Model> {
+    let conditions = Conditions::new(scene)?;
+    let mesh = &*centred(&scene.mesh);
+    let effects = &scene.effects;
     let line_groups = effects.fibre_lines.as_ref().map_or_else(Vec::new, |lines| line_groups(mesh, lines.threads));
-    let ties = effects.contact.as_ref().map_or_else(Ties::default, |contact| Ties::new(case, mesh, contact));
-    let active = Active::new(case, friction, mesh, &line_groups, ties.count() > 0);
+    let active = Active::new(scene, &line_groups);
     let periodic = active.periodic;
     let nodes = mesh.nodes.len();
     let first = mesh.first_thread_node();
-    let hourglass = case.integration.hourglass_control();
+    let hourglass = scene.integration.hourglass_control();
     let solids = Solids::new(mesh, hourglass)?;
     let threads = Threads::new(mesh, active.bending, &conditions.held);
     let (hexes, beams, bends) = (solids.headers.len(), threads.beams(), threads.pairs.len() / 2);
@@ -258,7 +254,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     // state of nodes
     let planes: [Vec<i32>; 3] = std::array::from_fn(|k| mesh.nodes.iter().map(|x| quanta(x[k])).collect());
     let reference = b.add("reference position", Kind::Int, 3 * nodes, false, Initial::Int(planes.concat()));
-    let start = perturbation::start(mesh, case.integration.perturbation_mm, &conditions);
+    let start = perturbation::start(mesh, scene.integration.perturbation_mm, &conditions);
     let quanta_ = b.add("displacement quanta", Kind::Int, 3 * nodes, true, Initial::Int(start));
     let remainder = b.add("displacement remainder", Kind::Scalar, 3 * nodes, true, Initial::Zero);
     let velocity = b.add("velocity", Kind::Scalar, 3 * nodes, true, Initial::Scalar(initial_velocity(mesh)));
@@ -323,20 +319,19 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let before = searched.map(|_| b.add(name, Kind::Int, 3 * nodes, true, Initial::Zero));
     let mut reads = vec![quanta_, remainder, velocity];
     reads.extend(searched.into_iter().flatten());
-    let kernel = flagged!(travel::Travel; active.searches());
+    let kernel = flagged!(skin::Travel; active.searches());
     let writes = [(status_, Access::Atomic)];
     b.plan.watch.push(waiting(coded(kernel, "travel", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0])));
 
     // contact
     let contact = effects.contact.as_ref().filter(|_| active.searches() || active.ties).map(|chosen| {
-        let scene = ContactScene {
+        let contact = ContactScene {
             chosen,
             active,
-            friction,
             mesh,
             threads: &threads,
             conditions: &conditions,
-            ties,
+            ties: &scene.ties,
             capacity,
             reference,
             quanta: quanta_,
@@ -348,13 +343,13 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
             ends,
             beams: beam_table,
         };
-        scene.add(&mut b)
+        contact.add(&mut b)
     });
     let contact = contact.transpose()?;
     if let Some([search_quanta, search_remainder]) = searched {
         let writes = [(search_quanta, own(3, 1)), (search_remainder, own(3, 1))];
         let reads = [quanta_, remainder];
-        b.plan.search.push(after::<travel::Remember>("remember", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0]));
+        b.plan.search.push(after::<skin::Remember>("remember", nodes, NODE_GRAIN, &reads, &writes, [0u32; 0]));
     }
 
     // accelerations
@@ -389,8 +384,8 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
     let (mut reaction, mut reaction_work, mut condition_nodes) = (None, None, None);
     if conditions.count() > 0 {
         let count = conditions.count();
-        let at = b.indices("prescribed nodes", conditions.nodes);
-        let targets = b.table("prescribed displacements", conditions.targets);
+        let at = b.indices("prescribed nodes", conditions.nodes.clone());
+        let targets = b.table("prescribed displacements", conditions.targets.clone());
         let (force, done) = (b.scratch("reactions", 3 * count), b.scratch("work of reactions", count));
         (reaction, reaction_work, condition_nodes) = (Some(force), Some(done), Some((at, count)));
         let reads = [at, targets, velocity, mass];
@@ -565,6 +560,7 @@ pub fn build(case: &Case, friction: f64, mesh: &Mesh, capacity: Capacity) -> Res
         touch: penalty::touch(active.friction),
         slot_state: slot_state(active.friction),
         limits: Limits { thread_radius: radius, yarn_thickness: thickness },
+        acts_after: conditions.after,
     })
 }
 

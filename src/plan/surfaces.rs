@@ -3,7 +3,6 @@
 use super::ContactPoint;
 use super::effects::Active;
 use super::threads::Threads;
-use crate::case::effects::Contact;
 use crate::contact::candidates::CARRIER;
 use crate::contact::grid::SLAB_FACES;
 use crate::contact::surface::{FACE, MOST_FACES, MOST_NODES, coded, marks};
@@ -12,6 +11,7 @@ use crate::elements::beam2::TABLE;
 use crate::error::{Error, Result};
 use crate::mesh::surface::{Surface, owned};
 use crate::mesh::{Mesh, Seen};
+use crate::settings::effects::Contact;
 
 /// What carries contact points: see [`crate::contact::candidates::CARRIER`], [`crate::contact::surface::CARRIED`] and
 /// [`crate::contact::surface::POINT`].

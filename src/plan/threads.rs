@@ -5,7 +5,7 @@
 //! cell 0.24 % short of thread, and too tight. Since beams know chords L₀, the table holds EA L₀/s, and the
 //! thermal strain is ε_th s/L₀ + s/L₀ − 1. Threads start at rest as generated, and those that nothing tightens stay so.
 
-use crate::contact::bow;
+use crate::contact::arc_offset;
 use crate::dynamics::assemble::{BENT, NONE, THREAD};
 use crate::elements::beam2::TABLE;
 use crate::elements::bend::smoothed;
@@ -35,7 +35,7 @@ pub struct Threads {
     pub line_stiffness: Vec<f64>,
     /// See [`crate::dynamics::time_step::ROWS`].
     pub bend_rows: Vec<f64>,
-    /// See [`crate::contact::bow`].
+    /// See [`crate::contact::arc_offset`].
     pub neighbours: Vec<u32>,
     pub shares: Vec<f64>,
     /// Radius of each thread node, mm.
@@ -127,7 +127,7 @@ impl Threads {
             let [before, behind] = [at(i > 0, i + count - 1), at(i + 1 < count, i + 1)];
             self.neighbours.extend([(base + before) as u32, (base + behind) as u32, thread as u32, x as u32, y as u32]);
             let shares =
-                |end: bool, a: usize, b: usize| if end { [0.0; 2] } else { bow::shares(lengths[a], lengths[b]) };
+                |end: bool, a: usize, b: usize| if end { [0.0; 2] } else { arc_offset::shares(lengths[a], lengths[b]) };
             self.shares.extend(shares(before == i, before, i));
             self.shares.extend(shares(behind == i, i, behind));
             self.shares.extend([arc + 0.5 * length, length, if wrap.is_some() { whole } else { 0.0 }]);

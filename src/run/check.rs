@@ -1,12 +1,12 @@
 //! A look at a case before it is run: sizes, effects, expected time, and on request what each effect costs and the whole algorithm.
 
 use super::effects::{Effect, effects};
+use super::interleaved_timing::{Ratio, ratio, step_time, trial, wall};
 use super::notes::notes;
-use super::turns::{Ratio, ratio, step_time, trial, wall};
-use super::{probes, scene, simulation};
-use crate::case::read::Loaded;
+use super::{probes, simulation};
 use crate::error::{Error, Result};
-use crate::simulate::{Make, Simulation};
+use crate::rigs::read::Loaded;
+use crate::simulate::{BackendConfig, Simulation};
 use std::fmt::Write as _;
 
 /// Seconds of the turns that the share of an effect is measured in, at most, and how many turns there are.
@@ -16,9 +16,8 @@ const TURNS: usize = 7;
 /// Sizes and cost of a case; with `explain` what called for each effect and what it costs, every stage of the plan, and the
 /// defaults in use.
 pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
-    let (mesh, friction) = scene(loaded)?;
-    probes::nodes(&loaded.case.output.probes, &mesh)?;
-    let mut probe = Simulation::new(&loaded.case, friction, mesh, Make::default())?;
+    let mut probe = simulation(loaded, BackendConfig::default())?;
+    probes::nodes(&loaded.case.output.probes, probe.mesh())?;
     let bytes: usize = probe.model.plan.buffers.iter().map(|b| 4 * b.len).sum();
     probe.advance(0.0, |_| false)?;
     let (dt, end) = (probe.dt(), probe.schedule.end());
@@ -40,12 +39,12 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
     let _ = writeln!(
         t,
         "mesh       {} hexes, {} beams, {} nodes; {:.1} MB of buffers in f32",
-        probe.mesh.hexes(),
-        probe.mesh.beams(),
-        probe.mesh.nodes.len(),
+        probe.mesh().hexes(),
+        probe.mesh().beams(),
+        probe.mesh().nodes.len(),
         bytes as f64 / 1e6
     );
-    for note in notes(loaded) {
+    for note in notes(loaded, probe.mesh()) {
         let _ = writeln!(t, "note       {note}");
     }
     let _ = writeln!(t, "effects    {}", found.iter().map(|e| e.name).collect::<Vec<_>>().join(", "));
@@ -103,7 +102,7 @@ fn since(before: &[(&'static str, f64)], now: Vec<(&'static str, f64)>) -> Vec<(
 
 /// A scene for a trial, after its first contact search.
 fn begun(loaded: &Loaded) -> Result<Simulation> {
-    let mut simulation = simulation(loaded, trial(&Make::default()))?;
+    let mut simulation = simulation(loaded, trial(&BackendConfig::default()))?;
     simulation.advance(0.0, |_| false)?;
     Ok(simulation)
 }

@@ -1,11 +1,11 @@
 //! The effects of a scene by name: what called for each, which stages are there for it alone, and the case without it.
 
 use crate::case::FabricSource;
-use crate::case::domain::{Domain, ThreadEnds};
-use crate::case::effects::Contact;
-use crate::case::read::Loaded;
 use crate::contact::EMPTY;
 use crate::contact::candidates::MADE;
+use crate::rigs;
+use crate::rigs::read::Loaded;
+use crate::settings::effects::Contact;
 use crate::simulate::Simulation;
 
 /// An effect that a scene has.
@@ -25,9 +25,6 @@ impl Effect {
         self.off.map(|off| {
             let mut loaded = loaded.clone();
             off(&mut loaded);
-            if let (Some(fabric), Some(FabricSource::Inline(inline))) = (&loaded.fabric, &mut loaded.case.fabric) {
-                (**inline).clone_from(fabric);
-            }
             loaded
         })
     }
@@ -60,7 +57,7 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
     };
     let thread = |largest: fn(&crate::mesh::Thread) -> f64| {
         simulation
-            .mesh
+            .mesh()
             .threads
             .iter()
             .map(largest)
@@ -107,15 +104,7 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
     add(
         active.friction,
         "friction",
-        &|| match (&loaded.fabric, &loaded.case.domain) {
-            (Some(fabric), _) => {
-                format!("{} and fabric.friction = {}", written("effects.contact.friction"), fabric.friction)
-            }
-            (None, Domain::Mesh(mesh)) => {
-                format!("{} and domain.mesh.friction = {}", written("effects.contact.friction"), mesh.friction)
-            }
-            (None, _) => written("effects.contact.friction"),
-        },
+        &|| format!("{}; the coefficient is {}", written("effects.contact.friction"), simulation.mesh().friction),
         &[],
         Some(|l| contact(l, |c| c.friction = false)),
     );
@@ -136,9 +125,7 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
         },
         &["ties"],
         Some(|l| {
-            if let Domain::Specimen(specimen) = &mut l.case.domain {
-                specimen.thread_ends = ThreadEnds::Free;
-            }
+            rigs::of_mut(&mut l.case.domain).free_thread_ends();
         }),
     );
     add(
@@ -154,12 +141,10 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
         &|| format!("a pretension step, and a thread with a thermal strain of {} in it", thread(|t| t.thermal_strain)),
         &[],
         Some(|l| {
-            if let Some(fabric) = &mut l.fabric {
+            if let Some(FabricSource::Inline(fabric)) = &mut l.case.fabric {
                 fabric.stitch.thermal_strain = 0.0;
             }
-            if let Domain::Mesh(mesh) = &mut l.case.domain {
-                mesh.threads.iter_mut().for_each(|thread| thread.thermal_strain = 0.0);
-            }
+            rigs::of_mut(&mut l.case.domain).relax_threads();
         }),
     );
     add(
@@ -204,10 +189,7 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
     add(
         prescribed > 0,
         "prescribed motion",
-        &|| match &loaded.case.domain {
-            Domain::Mesh(_) => format!("domain.mesh.conditions; {prescribed} nodes"),
-            _ => format!("the clamps of domain.specimen; {prescribed} nodes"),
-        },
+        &|| format!("{prescribed} nodes of {}", grips(simulation)),
         &["prescribed"],
         None,
     );
@@ -219,6 +201,15 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
         None,
     );
     found
+}
+
+/// Names of what prescribes motion, the first few.
+fn grips(simulation: &Simulation) -> String {
+    const FEW: usize = 3;
+    let motions = &simulation.scene.motions;
+    let names: Vec<&str> = motions.iter().take(FEW).map(|motion| motion.name.as_str()).collect();
+    let more = motions.len().saturating_sub(FEW);
+    names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
 }
 
 /// Beams and nodes of yarns that have another yarn within reach, and pairs of beams within reach of each other.

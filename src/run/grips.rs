@@ -2,12 +2,12 @@
 
 use crate::error::Result;
 use crate::output::table::{Cell, REACTIONS, Table};
-use crate::plan::{Grip, grips};
+use crate::scene::Motion;
 use crate::simulate::Simulation;
 
 /// The grips of a scene.
 pub(super) struct Grips {
-    grips: Vec<Grip>,
+    grips: Vec<Motion>,
     /// Prescribed nodes of each grip, by their place in the list of reactions, with the components that count as its own: what two
     /// grips prescribe belongs to the first.
     own: Vec<Vec<(usize, [bool; 3])>>,
@@ -17,7 +17,7 @@ pub(super) struct Grips {
 impl Grips {
     /// Those of a simulation; `None` if nothing is prescribed.
     pub(super) fn of(simulation: &Simulation, table: impl Fn(&str, &[&str]) -> Result<Table>) -> Result<Option<Self>> {
-        let grips = grips(simulation.case(), &simulation.mesh);
+        let grips = simulation.scene.motions.clone();
         if grips.is_empty() {
             return Ok(None);
         }

@@ -1,13 +1,14 @@
 //! The mesh of a case as files, without running it.
 
 use super::picture::draw;
-use super::{scene, write_case};
-use crate::case::read::Loaded;
+use super::write_case;
 use crate::error::Result;
 use crate::mesh::frame::Frame;
 use crate::mesh::{export, report};
 use crate::output::{directory, vtu};
-use crate::plan::{grips, tied};
+use crate::rigs;
+use crate::rigs::read::Loaded;
+use crate::scene::Scene;
 use std::path::Path;
 
 /// Writes the mesh of a case to a folder: VTU and Abaqus input; returns its report. A folder that holds anything is refused, or with
@@ -16,15 +17,15 @@ use std::path::Path;
 /// # Errors
 /// Geometry that cannot be meshed, or a folder that cannot be used.
 pub fn mesh(loaded: &Loaded, dir: &Path, force: bool) -> Result<String> {
-    let (mesh, _) = scene(loaded)?;
+    let Scene { mesh, motions, ties, .. } = rigs::scene(&loaded.case)?;
     let _held = directory::prepare(dir, force)?;
     write_case(&loaded.case, dir)?;
     let frame = Frame { gradient: [[1.0, 0.0], [0.0, 1.0]], positions: mesh.nodes.clone(), ..Frame::default() };
     vtu::write(&mesh, &frame, &dir.join("mesh.vtu"))?;
-    let mut sets: Vec<_> = grips(&loaded.case, &mesh).into_iter().map(|grip| (grip.name, grip.nodes)).collect();
-    sets.push(("ties".into(), tied(&loaded.case, &mesh)));
+    let mut sets: Vec<_> = motions.into_iter().map(|motion| (motion.name, motion.nodes)).collect();
+    sets.push(("ties".into(), ties.iter().map(|tie| tie.node).collect()));
     export::write_inp(&mesh, &sets, &dir.join("mesh.inp"))?;
     draw(&mesh, &frame, &loaded.case.title, 1600, &dir.join("mesh.png"))?;
     let files = format!("written    {0}/mesh.vtu, {0}/mesh.inp, {0}/mesh.png", dir.display());
-    Ok(format!("{}\n{files}", report::report(&mesh, &loaded.case)))
+    Ok(format!("{}\n{files}", report::report(&mesh, &loaded.case.title)))
 }

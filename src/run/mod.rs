@@ -2,22 +2,19 @@
 
 mod check;
 pub mod clock;
-mod crossings;
 mod devices;
 pub mod effects;
-mod findings;
 mod grips;
+pub mod interleaved_timing;
 mod log;
 mod mesh;
 mod notes;
 mod picture;
 mod probes;
-mod pulled;
 mod report;
 mod resume;
 mod rows;
 mod summary;
-pub mod turns;
 
 pub use check::check;
 pub use devices::devices;
@@ -28,27 +25,24 @@ pub use resume::may_differ;
 
 use crate::backend::gpu::{self, Device};
 use crate::case::Case;
-use crate::case::domain::Domain;
-use crate::case::read::Loaded;
-use crate::case::steps::{Precision, Step};
 use crate::error::{Error, Result};
-use crate::fabric;
-use crate::measure::yarns;
-use crate::mesh::{Mesh, Ply};
+use crate::mesh::Ply;
 use crate::output::checkpoint::Checkpoint;
 use crate::output::lock::Lock;
 use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH};
 use crate::output::{directory, file, vtu};
-use crate::simulate::{Make, Retries, Simulation};
-use crossings::Crossed;
+use crate::rigs;
+use crate::rigs::observer::{Observer, Tables};
+use crate::rigs::read::Loaded;
+use crate::settings::integration::Precision;
+use crate::settings::steps::Step;
+use crate::simulate::{BackendConfig, Retries, Simulation};
 use grips::Grips;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use log::Log;
 use picture::draw;
 use probes::Probes;
-use pulled::Pulled;
 use resume::Start;
-use rows::STRESS;
 use std::fmt;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -98,7 +92,12 @@ pub enum Machine {
 ///
 /// # Errors
 /// No such machine here.
-pub fn make(precision: Precision, machine: Machine, threads: Option<usize>, adapter: &str) -> Result<Make> {
+pub fn backend_config(
+    precision: Precision,
+    machine: Machine,
+    threads: Option<usize>,
+    adapter: &str,
+) -> Result<BackendConfig> {
     let wanted = match machine {
         Machine::Cpu => false,
         Machine::Gpu => true,
@@ -112,7 +111,7 @@ pub fn make(precision: Precision, machine: Machine, threads: Option<usize>, adap
         );
         return Err(Error::Unsupported(what));
     }
-    Ok(Make { precision, threads: threads.unwrap_or(0), device, ..Make::default() })
+    Ok(BackendConfig { precision, threads: threads.unwrap_or(0), device, ..BackendConfig::default() })
 }
 
 /// What a run found, in a dozen lines.
@@ -130,34 +129,22 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// The mesh of a case and its friction coefficient.
-fn scene(loaded: &Loaded) -> Result<(Mesh, f64)> {
-    let mesh = fabric::build(&loaded.case, loaded.fabric.as_ref())?;
-    let friction = match (&loaded.fabric, &loaded.case.domain) {
-        (Some(fabric), _) => fabric.friction,
-        (None, Domain::Mesh(inline)) => inline.friction,
-        (None, _) => 0.0,
-    };
-    Ok((mesh, friction))
-}
-
 /// Writes the case, its fabric inline, so that a folder of results can be drawn and run again by itself.
 fn write_case(case: &Case, dir: &Path) -> Result<()> {
     file::replace(&dir.join(CASE), |w| serde_json::to_writer_pretty(w, case).map_err(Into::into))
 }
 
 /// Prepares a case for running, without files.
-pub fn simulation(loaded: &Loaded, make: Make) -> Result<Simulation> {
-    let (mesh, friction) = scene(loaded)?;
-    Simulation::new(&loaded.case, friction, mesh, make)
+pub fn simulation(loaded: &Loaded, config: BackendConfig) -> Result<Simulation> {
+    Simulation::new(rigs::scene(&loaded.case)?, config)
 }
 
 /// A scene in the state that a run of the same case left in a checkpoint.
 ///
 /// # Errors
 /// A file that cannot be read, or the state of another scene.
-pub fn simulation_at(loaded: &Loaded, make: Make, state: &Path) -> Result<Simulation> {
-    let mut simulation = simulation(loaded, make)?;
+pub fn simulation_at(loaded: &Loaded, config: BackendConfig, state: &Path) -> Result<Simulation> {
+    let mut simulation = simulation(loaded, config)?;
     let Checkpoint { header, records: [host, _], buffers } = Checkpoint::read(state)?;
     simulation.restore(host, &header.buffers, &buffers).map_err(|e| Error::file(state, e))?;
     Ok(simulation)
@@ -176,8 +163,8 @@ pub fn run(loaded: &Loaded, options: &Options) -> Result<Outcome> {
 ///
 /// # Errors
 /// As of [`run`].
-pub fn run_on(loaded: &Loaded, options: &Options, make: Make) -> Result<Outcome> {
-    drive(loaded, options, make, &mut || Duration::ZERO)
+pub fn run_on(loaded: &Loaded, options: &Options, config: BackendConfig) -> Result<Outcome> {
+    drive(loaded, options, config, &mut || Duration::ZERO)
 }
 
 /// Runs a case and calls `watch` behind every row of the tables; the time that it says to have taken does not count.
@@ -186,14 +173,19 @@ pub fn run_on(loaded: &Loaded, options: &Options, make: Make) -> Result<Outcome>
 /// As of [`run`].
 pub fn run_watched(loaded: &Loaded, options: &Options, watch: &mut dyn FnMut() -> Duration) -> Result<Outcome> {
     let precision = options.precision.unwrap_or(loaded.case.integration.precision);
-    drive(loaded, options, make(precision, options.machine, options.threads, &options.adapter)?, watch)
+    drive(loaded, options, backend_config(precision, options.machine, options.threads, &options.adapter)?, watch)
 }
 
-fn drive(loaded: &Loaded, options: &Options, make: Make, watch: &mut dyn FnMut() -> Duration) -> Result<Outcome> {
+fn drive(
+    loaded: &Loaded,
+    options: &Options,
+    config: BackendConfig,
+    watch: &mut dyn FnMut() -> Duration,
+) -> Result<Outcome> {
     let mut loaded = loaded.clone();
-    loaded.case.integration.precision = make.precision;
-    let mut simulation = simulation(&loaded, make)?;
-    probes::nodes(&loaded.case.output.probes, &simulation.mesh)?;
+    loaded.case.integration.precision = config.precision;
+    let mut simulation = simulation(&loaded, config)?;
+    probes::nodes(&loaded.case.output.probes, simulation.mesh())?;
     let held = if options.resume && options.output.is_dir() { Some(Lock::take(&options.output)?) } else { None };
     let start = Start::of(&loaded.case, options, &mut simulation)?;
     let _held = match start {
@@ -238,28 +230,17 @@ struct Run<'a> {
     stopped: Arc<AtomicBool>,
     history: Table,
     energies: Table,
-    /// Of a periodic cell.
-    stress: Option<Table>,
     contacts: Table,
     yarns: Option<[Table; 2]>,
     stitches: Option<Table>,
-    crossings: Option<Crossed>,
     grips: Option<Grips>,
     probes: Option<Probes>,
-    /// Of a specimen.
-    pulled: Option<Pulled>,
+    /// What only the rig measures.
+    observer: Box<dyn Observer>,
     frames: Vec<(f64, String)>,
     pictures: Vec<String>,
-    /// Shear angle, degrees, and F_nor, N/mm, at the rows of shear of a cell.
-    curve: Vec<(f64, f64)>,
-    /// Shear angle (rad) and external work (mJ) of a cell at the last row.
-    last_shear: [f64; 2],
-    /// Squares of the errors of the membrane forces along x and y, (N/mm)², summed over the rows of shear, and their number.
-    missed: [f64; 3],
     /// Number of the last load step in which nothing was loaded, and the share of kinetic in all energy at its end.
     rest: Option<(usize, f64)>,
-    /// Mean width, thickness and gap of warp and weft before shear, mm.
-    settled: Option<[[f64; 3]; 2]>,
     worst_balance: f64,
     worst_kinetic: Option<f64>,
     largest_added: [f64; 2],
@@ -312,41 +293,30 @@ impl<'a> Run<'a> {
             .into_iter()
             .chain(simulation.energies().columns().map(|(name, _)| name))
             .collect();
-        let mesh = &simulation.mesh;
+        let mesh = simulation.mesh();
         let plies = mesh.blocks.iter().any(|b| b.ply == Ply::Warp) && mesh.blocks.iter().any(|b| b.ply == Ply::Weft);
         let threads = !mesh.threads.is_empty();
         let folder = dir.join("frames");
         std::fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, e))?;
-        let table = |name: &str, header: &[&str]| {
-            let path = dir.join(name);
-            if goes_on { Table::open(&path, header.len()) } else { Table::create(&path, header) }
-        };
+        let tables = Tables { dir: dir.clone(), goes_on };
+        let table = |name: &str, header: &[&str]| tables.open(name, header);
         Ok(Self {
             loaded,
             options,
             history: table("history.csv", HISTORY)?,
             energies: table("energies.csv", &energies)?,
-            stress: if mesh.period.is_some() { Some(table("stress.csv", &STRESS)?) } else { None },
             contacts: table("contacts.csv", CONTACTS)?,
             yarns: if plies { Some([table("yarns.csv", YARNS)?, table("yarns_each.csv", YARNS_EACH)?]) } else { None },
             stitches: if threads { Some(table("stitches.csv", STITCHES)?) } else { None },
-            crossings: Crossed::of(&loaded.case.domain, mesh, table)?,
             grips: Grips::of(&simulation, table)?,
             probes: Probes::of(&loaded.case.output.probes, mesh, table)?,
-            pulled: match &loaded.case.domain {
-                Domain::Specimen(specimen) => Some(Pulled::of(specimen, &simulation)),
-                _ => None,
-            },
+            observer: rigs::of(&loaded.case.domain).observer(&loaded.case, &simulation, &tables)?,
             retries: Retries::of(&simulation),
             simulation,
             stopped,
             frames: Vec::new(),
             pictures: Vec::new(),
-            curve: Vec::new(),
-            last_shear: [0.0; 2],
-            missed: [0.0; 3],
             rest: None,
-            settled: None,
             worst_balance: 0.0,
             worst_kinetic: None,
             largest_added: [0.0; 2],
@@ -387,7 +357,7 @@ impl<'a> Run<'a> {
         for (number, (phase, step)) in phases.iter().zip(&self.loaded.case.steps).enumerate().skip(self.place.phase) {
             let (marks, unit, reach) = match step {
                 Step::Shear { .. } => (output.frames_at_deg.clone(), "deg", 1.0),
-                Step::Move { .. } => (output.frames_at_mm.clone(), "mm", self.loaded.case.domain.reach_mm()),
+                Step::Move { .. } => (output.frames_at_mm.clone(), "mm", self.simulation.scene.reach()),
                 _ => (Vec::new(), "", 1.0),
             };
             let rows = output.rows_per_step.max(1);
@@ -431,9 +401,7 @@ impl<'a> Run<'a> {
                     return self.write_frame("interrupted");
                 }
             }
-            if !matches!(step, Step::Shear { .. } | Step::Move { .. }) {
-                self.settle()?;
-            }
+            self.observer.end_of_step(&self.simulation, step)?;
             if matches!(step, Step::Settle { .. } | Step::Hold { .. }) {
                 let e = self.simulation.energies();
                 let all = e.kinetic_total + e.internal() + e.contact;
@@ -465,18 +433,6 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Sizes of yarns before shear, for the last lines.
-    fn settle(&mut self) -> Result<()> {
-        if self.yarns.is_some() {
-            let frame = self.simulation.frame();
-            self.simulation.alive()?;
-            let yarns = yarns::measure(&self.simulation.mesh, &frame)?;
-            let means = |p: yarns::Sizes| [p.width.mean, p.thickness.mean, p.gap.mean];
-            self.settled = Some([Ply::Warp, Ply::Weft].map(|ply| means(yarns::ply(&yarns, ply))));
-        }
-        Ok(())
-    }
-
     fn bar(&self) -> ProgressBar {
         if self.options.quiet {
             return ProgressBar::hidden();
@@ -497,7 +453,7 @@ impl<'a> Run<'a> {
         let each = (self.wall() - self.taken_up.1) / s.step().saturating_sub(self.taken_up.0).max(1) as f64;
         let left = HumanDuration(Duration::from_secs_f64((steps * each).clamp(0.0, 1e8)));
         let load = s.load();
-        let loaded = match s.mesh.period {
+        let loaded = match s.mesh().period {
             Some(_) => format!("γ {:.1}°", load.angle.to_degrees()),
             None => format!("d {:.2} mm", s.displacement()),
         };
@@ -527,18 +483,15 @@ impl<'a> Run<'a> {
         let mut frame = s.frame();
         s.alive()?;
         let dir = &self.options.output;
-        let crossings = self.crossings.as_ref().map(|c| c.see(&s.mesh, &mut frame)).transpose()?;
-        let file = format!("frames/{:04}-{name}.vtu", self.frames.len());
-        vtu::write(&s.mesh, &frame, &dir.join(&file))?;
+        let name = format!("{:04}-{name}", self.frames.len());
+        self.observer.frame(s, &mut frame, dir, &name)?;
+        let file = format!("frames/{name}.vtu");
+        vtu::write(s.mesh(), &frame, &dir.join(&file))?;
         self.frames.push((frame.time, file));
         vtu::write_collection(&dir.join("run.pvd"), &self.frames)?;
-        if let (Some(crossed), Some(crossings)) = (&mut self.crossings, crossings) {
-            let map = format!("frames/{:04}-{name}.vtp", self.frames.len() - 1);
-            crossed.write_frame(&s.mesh, &frame, &crossings, dir, map)?;
-        }
         if self.loaded.case.output.pictures {
-            let file = format!("{:04}-{name}.png", self.frames.len() - 1);
-            draw(&s.mesh, &frame, &self.loaded.case.title, 1200, &dir.join(&file))?;
+            let file = format!("{name}.png");
+            draw(s.mesh(), &frame, &self.loaded.case.title, 1200, &dir.join(&file))?;
             self.pictures.push(file);
         }
         Ok(())

@@ -1,34 +1,27 @@
 //! What a user should know about a case that is valid all the same.
 
-use crate::case::domain::Domain;
-use crate::case::fabric::Material;
-use crate::case::read::Loaded;
-use crate::case::steps::{Hexahedra, Step};
+use crate::mesh::{Mesh, Ply};
+use crate::rigs::read::Loaded;
+use crate::settings::integration::Hexahedra;
+use crate::settings::material::Material;
+use crate::settings::steps::Step;
 
 /// Poisson's ratio above which hexahedra with eight points of integration lock so much that a slender beam of them bends visibly less
 /// than one of hexahedra with one point.
 const LOCKS: f64 = 0.4;
 
 /// Sentences, each with what to do.
-pub(super) fn notes(Loaded { case, fabric, .. }: &Loaded) -> Vec<String> {
-    let inline = match &case.domain {
-        Domain::Mesh(inline) => Some(inline),
-        _ => None,
-    };
-    let blocks =
-        inline.into_iter().flat_map(|inline| &inline.blocks).map(|block| (block.name.as_str(), &block.material));
-    let plies = fabric.iter().flat_map(|f| [("the warp", &f.warp.material), ("the weft", &f.weft.material)]);
-    let locks = |material: &Material| matches!(material, Material::NeoHookean { poisson, .. } if *poisson > LOCKS);
+pub(super) fn notes(Loaded { case, .. }: &Loaded, mesh: &Mesh) -> Vec<String> {
     let mut found = Vec::new();
     let tightens = case.steps.iter().any(|step| matches!(step, Step::Pretension { .. }));
-    if let Some(strain) = fabric.as_ref().map(|f| f.stitch.thermal_strain).filter(|strain| *strain != 0.0 && !tightens)
-    {
+    let loose = mesh.threads.iter().map(|thread| thread.thermal_strain).find(|strain| *strain != 0.0 && !tightens);
+    if let Some(strain) = loose {
         found.push(format!(
             "the stitch stays loose: without a pretension step its thermal strain of {strain} does not act"
         ));
     }
     if case.integration.hexahedra == Hexahedra::Full {
-        let locked: Vec<&str> = plies.chain(blocks).filter(|(_, m)| locks(m)).map(|(name, _)| name).collect();
+        let locked = locking(mesh);
         if let Some(first) = locked.first() {
             let more = if locked.len() > 1 { format!(" and {} more", locked.len() - 1) } else { String::new() };
             found.push(format!(
@@ -38,4 +31,21 @@ pub(super) fn notes(Loaded { case, fabric, .. }: &Loaded) -> Vec<String> {
         }
     }
     found
+}
+
+/// Plies, and blocks of their own, of a law whose hexahedra lock.
+fn locking(mesh: &Mesh) -> Vec<&str> {
+    let locks = |material: &Material| matches!(material, Material::NeoHookean { poisson, .. } if *poisson > LOCKS);
+    let mut names: Vec<&str> = Vec::new();
+    for block in mesh.blocks.iter().filter(|block| locks(&block.material)) {
+        let name = match block.ply {
+            Ply::Warp => "the warp",
+            Ply::Weft => "the weft",
+            Ply::Free => &block.name,
+        };
+        if names.last() != Some(&name) {
+            names.push(name);
+        }
+    }
+    names
 }

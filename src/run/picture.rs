@@ -2,13 +2,14 @@
 //!
 //! A frame on disk is drawn with the mesh of its case, which every folder of results holds as `case.json`.
 
-use super::{CASE, scene};
-use crate::case::read::read;
+use super::CASE;
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::mesh::frame::Frame;
 use crate::output::picture::{View, render};
 use crate::output::vtu_read;
+use crate::rigs;
+use crate::rigs::read::read;
 use std::path::{Path, PathBuf};
 
 /// Draws a frame (`.vtu`), or one of the folder of a run or mesh, to a PNG: the one whose number or name is `frame`, or the last.
@@ -35,7 +36,7 @@ pub fn picture(source: &Path, frame: Option<&str>, view: &View, out: &Path) -> R
         return Err(Error::file(path, "no such file: give the folder of a run, or one of its frames (.vtu)"));
     }
     let loaded = read(&case_of(&path)?, &[])?;
-    let (mesh, _) = scene(&loaded)?;
+    let mesh = rigs::scene(&loaded.case)?.mesh;
     let frame = vtu_read::read(&path, &mesh)?;
     let replaced = if out.exists() { ", which is replaced" } else { "" };
     render(&mesh, &frame, &View { title: loaded.case.title, ..view.clone() })?.write_png(out)?;

@@ -1,6 +1,6 @@
 //! Displacements of places that the case names, in every row of `probes.csv`.
 
-use crate::case::steps::{Place, Probe};
+use crate::case::output::{Place, Probe};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::output::table::Table;
@@ -36,7 +36,7 @@ impl Probes {
 
     /// A row: mean displacement of the nodes of each probe from where they were given, with the deformation of the cell.
     pub(super) fn write(&mut self, simulation: &Simulation, degrees: f64) -> Result<()> {
-        let (frame, reference) = (simulation.frame(), &simulation.mesh.nodes);
+        let (frame, reference) = (simulation.frame(), &simulation.mesh().nodes);
         simulation.alive()?;
         let mut numbers = vec![simulation.time(), degrees, simulation.displacement()];
         for nodes in &self.nodes {

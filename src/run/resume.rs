@@ -1,7 +1,6 @@
 //! Checkpoints of a run: when they are written, and how a run goes on from one.
 
 use super::{CASE, FINISHED, Options, Place, Run};
-use crate::case::steps::Step;
 use crate::case::{Case, parse};
 use crate::error::{Error, Guard, Result};
 use crate::kernel::record::{Record, Recorded};
@@ -124,17 +123,8 @@ impl Run<'_> {
         self.place.record(record);
         self.frames.record(record);
         self.pictures.record(record);
-        if let Some(crossings) = &mut self.crossings {
-            crossings.maps.record(record);
-        }
-        if let Some(pulled) = &mut self.pulled {
-            pulled.record(record);
-        }
-        self.curve.record(record);
-        self.last_shear.record(record);
-        self.missed.record(record);
+        self.observer.record(record);
         self.rest.record(record);
-        self.settled.record(record);
         self.worst_balance.record(record);
         self.worst_kinetic.record(record);
         self.largest_added.record(record);
@@ -146,17 +136,15 @@ impl Run<'_> {
 
     fn tables(&mut self) -> Vec<&mut Table> {
         let tables = [&mut self.history, &mut self.energies, &mut self.contacts];
-        let crossings = self.crossings.iter_mut().flat_map(|c| &mut c.tables);
         let grips = self.grips.iter_mut().map(|grips| &mut grips.table);
         let probes = self.probes.iter_mut().map(|probes| &mut probes.table);
         tables
             .into_iter()
             .chain(grips)
             .chain(probes)
-            .chain(&mut self.stress)
             .chain(self.yarns.iter_mut().flatten())
             .chain(&mut self.stitches)
-            .chain(crossings)
+            .chain(self.observer.tables())
             .collect()
     }
 
@@ -166,19 +154,7 @@ impl Run<'_> {
             Start::New | Start::Again | Start::Finished => {}
             Start::From(phases) => {
                 self.place.phase = phases;
-                self.last_shear = [self.simulation.load().angle, self.simulation.energies().external];
-                let displacement = self.simulation.displacement();
-                if self.pulled.is_some() {
-                    let (_, crossings) = self.see()?;
-                    let zones = self.crossings.as_ref().and_then(|c| c.means(&crossings));
-                    if let Some(pulled) = &mut self.pulled {
-                        pulled.start(&self.simulation, displacement, zones);
-                    }
-                }
-                let sheared = |step: &Step| matches!(step, Step::Shear { .. } | Step::Move { .. });
-                if !self.loaded.case.steps[..phases].iter().any(sheared) {
-                    self.settle()?;
-                }
+                self.observer.start(&self.simulation, &self.loaded.case.steps[..phases])?;
             }
             Start::Resumed(own) => {
                 let mut lengths = Vec::new();

@@ -1,12 +1,12 @@
 //! Guards: each names the cause, where it was, its size, and what to change.
 
 use super::{Simulation, WINDOW};
-use crate::case::steps::Precision;
 use crate::contact::candidates::{self, CARRIER};
 use crate::contact::{EMPTY, of_key, status};
 use crate::error::{Error, Guard, Result};
 use crate::kernel::buffer::Buffer;
 use crate::kernel::position::MOST_MM;
+use crate::settings::integration::Precision;
 
 /// A step that is longer than the estimated limit by this factor is taken for unstable: the estimate is a bound from below, and
 /// measured limits were up to 2.3 times as large.
@@ -35,7 +35,7 @@ impl Simulation {
                 "load more slowly, lower integration.safety or refine the mesh",
             ));
         }
-        let tolerance = self.case.integration.energy_tolerance;
+        let tolerance = self.scene.integration.energy_tolerance;
         if h.balance.abs() > tolerance {
             let (node, speed) = self.fastest();
             let culprit = format!(
@@ -44,7 +44,7 @@ impl Simulation {
                 100.0 * tolerance,
                 self.node_owner(node)
             );
-            let advice = match (self.drifts(), self.make.precision) {
+            let advice = match (self.drifts(), self.config.precision) {
                 (false, Precision::F32) => {
                     "it explodes, as with too long a step: lower integration.safety or integration.dt_max_s; where that does not help, \
                      set integration.precision to f64"
@@ -73,7 +73,7 @@ impl Simulation {
     /// Stops a scene whose bodies are too deep inside each other, with what to do about it.
     fn guard_penetration(&self, advice: &str) -> Result<()> {
         let h = &self.health;
-        let allowed = self.case.integration.penetration_tolerance;
+        let allowed = self.scene.integration.penetration_tolerance;
         let l = &self.model.limits;
         let kinds = [
             ("a thread into a yarn", l.thread_radius),
@@ -117,7 +117,7 @@ impl Simulation {
         let touching = (0..keys.len()).filter(|slot| keys[*slot] != EMPTY);
         let slot = touching.max_by(|x, y| pressure(*x).total_cmp(&pressure(*y)))?;
         let node = points[slot / slots].nodes[0];
-        let body = &self.mesh.blocks[of_key(keys[slot]).0].name;
+        let body = &self.scene.mesh.blocks[of_key(keys[slot]).0].name;
         Some(format!("node {node} ({}) in {body}", self.node_owner(node)))
     }
 
@@ -148,7 +148,7 @@ impl Simulation {
     /// Stops a step that the user fixed and that cannot be stable; one that follows the estimate shortens by itself.
     pub(super) fn guard_step(&self) -> Result<()> {
         let limit = self.health.dt_limit;
-        match self.case.integration.dt_s {
+        match self.scene.integration.dt_s {
             Some(_) if self.dt > SURELY_UNSTABLE * limit => {
                 let node = self.health.limiting_node;
                 let culprit = format!(
@@ -166,7 +166,7 @@ impl Simulation {
     /// Name of the yarn that owns a hexahedron.
     pub(super) fn hex_owner(&self, hex: usize) -> String {
         let mut first = 0;
-        for block in &self.mesh.blocks {
+        for block in &self.scene.mesh.blocks {
             first += block.hexes();
             if hex < first {
                 return block.name.clone();
@@ -222,14 +222,14 @@ impl Simulation {
     }
 
     pub(super) fn first_not_finite(&self) -> Option<usize> {
-        let nodes = self.mesh.nodes.len();
+        let nodes = self.scene.mesh.nodes.len();
         self.backend.scalars(self.model.buffers.remainder).iter().position(|x| !x.is_finite()).map(|i| i % nodes)
     }
 
     /// Name of the body that owns a node.
     pub fn node_owner(&self, node: usize) -> String {
-        let blocks = self.mesh.blocks.iter().map(|b| (b.first..b.first + b.count(), &b.name));
-        let threads = self.mesh.threads.iter().map(|t| (t.first..t.first + t.count, &t.name));
+        let blocks = self.scene.mesh.blocks.iter().map(|b| (b.first..b.first + b.count(), &b.name));
+        let threads = self.scene.mesh.threads.iter().map(|t| (t.first..t.first + t.count, &t.name));
         blocks
             .chain(threads)
             .find(|(range, _)| range.contains(&node))

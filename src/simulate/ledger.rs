@@ -162,7 +162,7 @@ impl Simulation {
 
     /// Adds V P̄ over a window of `steps` from time `from` to `to`, and the external work there.
     pub(super) fn add_stress(&mut self, totals: &[f64], steps: u64, from: f64, to: f64) {
-        if self.mesh.period.is_none() {
+        if self.scene.mesh.period.is_none() {
             return;
         }
         let (places, virial) = (&self.model.totals, sums::virial(self.model.active.friction));

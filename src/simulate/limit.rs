@@ -5,12 +5,12 @@
 //! masses they would differ without any stiffness: both sides have the mass of both.
 
 use super::Simulation;
-use crate::case::steps::Precision;
 use crate::error::{Error, Result};
 use crate::kernel::position::QUANTUM;
 use crate::kernel::row::Row;
 use crate::kernel::stage::{Plan, Stage};
 use crate::plan;
+use crate::settings::integration::Precision;
 
 /// Friction that holds every contact of a scene with friction.
 const STICK: f64 = 1e6;
@@ -65,18 +65,20 @@ impl Simulation {
     /// # Errors
     /// A run in f32, whose forces are too coarse for differences.
     pub fn measured_limit(&mut self) -> Result<Limit> {
-        if self.make.precision != Precision::F64 {
+        if self.config.precision != Precision::F64 {
             return Err(Error::Unsupported(
                 "the limit of the time step is measured in f64: set integration.precision".into(),
             ));
         }
         // without friction there are no buffers for it
-        let friction = if self.friction > 0.0 { STICK } else { 0.0 };
-        let mut case = self.case.clone();
-        if let Some(contact_mass) = &mut case.effects.contact_mass {
+        let mut scene = self.scene.clone();
+        if scene.mesh.friction > 0.0 {
+            scene.mesh.friction = STICK;
+        }
+        if let Some(contact_mass) = &mut scene.effects.contact_mass {
             contact_mass.memory = 1.0;
         }
-        let stuck = plan::build(&case, friction, &self.mesh, self.capacity)?.plan;
+        let stuck = plan::build(&scene, self.capacity)?.plan;
         let names = |plan: &Plan| plan.buffers.iter().map(|b| (b.name, b.len)).collect::<Vec<_>>();
         assert_eq!(names(&stuck), names(&self.model.plan), "its stages run on the buffers of this scene");
         let mut stages = stuck.step;
@@ -85,7 +87,7 @@ impl Simulation {
         let b = &self.model.buffers;
         let (quanta, remainder) = (self.backend.ints(b.quanta), self.backend.scalars(b.remainder));
         let rest: Vec<f64> = quanta.iter().zip(remainder).map(|(q, r)| f64::from(*q) * QUANTUM + r).collect();
-        let nodes = self.mesh.nodes.len();
+        let nodes = self.scene.mesh.nodes.len();
         let mut free = vec![true; 3 * nodes];
         if let Some(prescribed) = b.prescribed {
             for condition in self.backend.uints(prescribed).chunks_exact(2) {

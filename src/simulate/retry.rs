@@ -35,7 +35,7 @@ struct Kept<T> {
 impl<T: Clone + Default> Retries<T> {
     /// As many as the case of a simulation allows.
     pub fn of(simulation: &Simulation) -> Self {
-        Self { allowed: simulation.case.integration.retries, guards: Vec::new(), kept: Vec::new() }
+        Self { allowed: simulation.scene.integration.retries, guards: Vec::new(), kept: Vec::new() }
     }
 
     /// What each guard said that sent the scene back.

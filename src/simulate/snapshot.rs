@@ -141,11 +141,11 @@ impl Simulation {
             return Err(Error::geometry("a damaged state", format!("its tables of contact have sizes {capacity:?}")));
         }
         if capacity != self.capacity {
-            self.model = plan::build(&self.case, self.friction, &self.mesh, capacity)?;
-            self.backend = self.make.backend(&self.model)?;
+            self.model = plan::build(&self.scene, capacity)?;
+            self.backend = self.config.backend(&self.model)?;
             self.capacity = capacity;
-            // what is prescribed acts in a new backend, until the next burst looks at the time
-            self.holds = true;
+            // in a new backend all that is prescribed acts, until the next burst looks at the time
+            self.acting = usize::MAX;
         }
         let changing = self.changing();
         let own = changing.iter().map(|b| (self.model.plan.buffers[b.0].name, self.backend.bytes(*b).len()));
@@ -205,18 +205,18 @@ impl Simulation {
                 return damaged("a face of list", at);
             }
         } else if lists.clone().any(|faces| faces.keys == buffer) {
-            let bodies = self.mesh.blocks.len();
+            let bodies = self.scene.mesh.blocks.len();
             let bad = |keys: &[u32]| keys[MADE..].iter().any(|key| *key != EMPTY && of_key(*key).0 >= bodies);
             if let Some(at) = numbers().chunks_exact(MADE + self.capacity.slots).position(bad) {
                 return damaged("a body that is touched by point", at);
             }
         } else if Some(buffer) == b.pair_keys {
-            let beams = self.mesh.beams();
+            let beams = self.scene.mesh.beams();
             let bad = |key: &u32| *key != EMPTY && of_key(*key).0 >= beams;
             if let Some(at) = numbers().iter().position(bad) {
                 return damaged("the beam of slot", at);
             }
-        } else if buffer == b.status && numbers()[status::CULPRIT] as usize >= self.mesh.nodes.len() {
+        } else if buffer == b.status && numbers()[status::CULPRIT] as usize >= self.scene.mesh.nodes.len() {
             return damaged("the node at place", status::CULPRIT);
         }
         Ok(())

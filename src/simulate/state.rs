@@ -1,12 +1,12 @@
 //! The state of a scene as the host sees it: positions, velocities, forces, fields for pictures, and its hash.
 
 use super::Simulation;
-use crate::case::steps::Precision;
 use crate::contact::{EMPTY, candidates, penalty};
 use crate::elements::LANES;
 use crate::kernel::buffer::Buffer;
 use crate::kernel::position::{QUANTUM, quanta};
 use crate::mesh::frame::{Field, Frame};
+use crate::settings::integration::Precision;
 use std::hash::Hasher;
 
 impl Simulation {
@@ -17,7 +17,7 @@ impl Simulation {
 
     /// Displacement of every node relative to F̄X, mm.
     pub fn fluctuations(&self) -> Vec<[f64; 3]> {
-        let nodes = self.mesh.nodes.len();
+        let nodes = self.scene.mesh.nodes.len();
         let quanta = self.backend.ints(self.model.buffers.quanta);
         let remainder = self.backend.scalars(self.model.buffers.remainder);
         (0..nodes)
@@ -27,7 +27,7 @@ impl Simulation {
 
     /// Velocity of every node (of the fluctuation in a periodic cell), mm/s.
     pub fn velocities(&self) -> Vec<[f64; 3]> {
-        let nodes = self.mesh.nodes.len();
+        let nodes = self.scene.mesh.nodes.len();
         let v = self.backend.scalars(self.model.buffers.velocity);
         (0..nodes).map(|n| [0, 1, 2].map(|k| v[n + k * nodes])).collect()
     }
@@ -42,7 +42,7 @@ impl Simulation {
     pub fn set_fluctuations(&mut self, displacements: &[[f64; 3]]) {
         let planes: [Vec<f64>; 3] = [0, 1, 2].map(|k| displacements.iter().map(|w| w[k]).collect());
         let planes = planes.concat();
-        let whole: Vec<i32> = match self.make.precision {
+        let whole: Vec<i32> = match self.config.precision {
             Precision::F32 => planes.iter().map(|w| quanta(*w)).collect(),
             Precision::F64 => vec![0; planes.len()],
         };
@@ -67,7 +67,7 @@ impl Simulation {
 
     /// Largest prescribed displacement now, mm.
     pub fn displacement(&self) -> f64 {
-        self.load().motion * self.case.domain.reach_mm()
+        self.load().motion * self.scene.reach()
     }
 
     /// The deformed state, with the fields that pictures and ParaView show.
@@ -75,6 +75,7 @@ impl Simulation {
         let gradient = self.row(self.time, 1.0, 1.0).gradient;
         let f = [[1.0 + gradient[0][0], gradient[0][1]], [gradient[1][0], 1.0 + gradient[1][1]]];
         let positions = self
+            .scene
             .mesh
             .nodes
             .iter()
@@ -93,7 +94,7 @@ impl Simulation {
         frame.node_fields = self.contact_fields();
         let field = |name: &str, components, values| Field { name: name.into(), components, values };
         frame.node_fields.push(field("velocity_mm_s", 3, self.velocities().concat()));
-        if !self.mesh.threads.is_empty() {
+        if !self.scene.mesh.threads.is_empty() {
             frame.beam_fields = vec![field("tension_n", 1, self.tensions())];
         }
         frame
@@ -120,17 +121,18 @@ impl Simulation {
                 Field { name: (*name).into(), components: 1, values: density.collect() }
             })
             .collect();
-        let mut stretches = Vec::with_capacity(self.mesh.hexes());
+        let mut stretches = Vec::with_capacity(self.scene.mesh.hexes());
         let length = |a: [f64; 3], b: [f64; 3]| libm::sqrt((0..3).map(|k| (b[k] - a[k]) * (b[k] - a[k])).sum());
-        for block in &self.mesh.blocks {
+        for block in &self.scene.mesh.blocks {
             for layer in 0..block.layers {
                 for column in 0..block.columns {
                     for slice in 0..block.slices {
                         let c = block.corners(slice, column, layer);
                         let edges = [(0, 1), (3, 2), (4, 5), (7, 6)];
                         let stretch = edges.map(|(a, b)| {
-                            let now = length(frame.position(&self.mesh, c[a]), frame.position(&self.mesh, c[b]));
-                            now / length(self.mesh.position(c[a]), self.mesh.position(c[b]))
+                            let now =
+                                length(frame.position(&self.scene.mesh, c[a]), frame.position(&self.scene.mesh, c[b]));
+                            now / length(self.scene.mesh.position(c[a]), self.scene.mesh.position(c[b]))
                         });
                         stretches.push(stretch.iter().sum::<f64>() / 4.0);
                     }
@@ -144,7 +146,7 @@ impl Simulation {
     /// Normal force, pressure of yarn surfaces, and with friction slip of contact points, on the nodes that they lie between.
     pub(super) fn contact_fields(&self) -> Vec<Field> {
         let b = &self.model.buffers;
-        let nodes = self.mesh.nodes.len();
+        let nodes = self.scene.mesh.nodes.len();
         let (mut force, mut pressure, mut slip) = (vec![0.0; nodes], vec![0.0; nodes], vec![0.0; nodes]);
         let mut measure = vec![0.0; nodes];
         for (kind, faces) in b.faces.iter().enumerate() {

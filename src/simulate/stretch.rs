@@ -14,12 +14,12 @@
 //! changes, K is that of straight fibres, with which the control is slow and sure.
 
 use super::{Simulation, WINDOW};
-use crate::case::steps::Along;
 use crate::kernel::record::{Record, Recorded};
 use crate::materials;
 use crate::measure::shear;
 use crate::mesh::{Mesh, quality};
 use crate::schedule::ramp;
+use crate::settings::steps::Along;
 
 /// Shares of a change of force and of its error that a window takes away.
 const PROPORTIONAL: f64 = 0.4;
@@ -168,7 +168,7 @@ impl Direction {
 impl Simulation {
     /// Reference area of a cell, mm².
     pub(super) fn area(&self) -> f64 {
-        self.mesh.period.map_or(1.0, |[x, y]| x * y)
+        self.scene.mesh.period.map_or(1.0, |[x, y]| x * y)
     }
 
     /// Both fibre directions of a cell, x and y.

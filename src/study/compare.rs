@@ -2,8 +2,8 @@
 
 use super::difference::{Difference, common, difference, value};
 use super::results::{MEASURES, Measure, Results};
-use crate::case::conform::brief;
 use crate::case::differences::differences;
+use crate::case::validate::brief;
 use crate::error::{Error, Result};
 use crate::output::table::Table;
 use serde_json::{Value, json};

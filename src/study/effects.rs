@@ -7,14 +7,14 @@
 
 use super::difference::difference;
 use super::results::{MEASURES, Measure, Results};
-use crate::case::read::Loaded;
 use crate::error::{Error, Guard, Result};
 use crate::output::directory;
 use crate::output::table::{Cell, Table};
+use crate::rigs::read::Loaded;
 use crate::run::effects::effects as effects_of;
-use crate::run::turns::{Ratio, ratio, trial};
+use crate::run::interleaved_timing::{Ratio, ratio, trial};
 use crate::run::{self, Machine};
-use crate::simulate::{Make, Simulation};
+use crate::simulate::{BackendConfig, Simulation};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,7 @@ const NOTHING: &str = "nothing (a µm aside)";
 /// What a study of effects is asked for.
 #[derive(Debug, Clone)]
 pub struct Options {
-    pub make: Make,
+    pub config: BackendConfig,
     /// Names of the effects that are turned off; empty for all.
     pub only: Vec<String>,
     /// The table; runs go into the folder of the same name beside it.
@@ -114,7 +114,7 @@ pub fn effects(loaded: &Loaded, options: &Options) -> Result<Study> {
 /// The scene with a checkpoint after every load step, and no pictures.
 fn plain(loaded: &Loaded, options: &Options) -> Loaded {
     let mut plain = loaded.clone();
-    plain.case.integration.precision = options.make.precision;
+    plain.case.integration.precision = options.config.precision;
     let output = &mut plain.case.output;
     (output.pictures, output.frames_per_step, output.checkpoint_wall_s) = (false, 0, Some(1e6));
     output.frames_at_deg.clear();
@@ -130,7 +130,7 @@ fn aside(scene: &Loaded) -> Loaded {
 
 /// The scene without each effect that can be turned off and is asked for.
 fn chosen(scene: &Loaded, options: &Options) -> Result<Vec<(&'static str, Loaded)>> {
-    let mut simulation = run::simulation(scene, options.make.clone())?;
+    let mut simulation = run::simulation(scene, options.config.clone())?;
     simulation.advance(0.0, |_| false)?;
     let found = effects_of(scene, &simulation);
     let mut variants: Vec<_> = found.iter().filter_map(|e| e.without(scene).map(|without| (e.name, without))).collect();
@@ -163,7 +163,7 @@ fn finish(scene: &Loaded, folder: &Path, options: &Options) -> Result<Option<Don
         from: None,
         quiet: true,
     };
-    let guard = match run::run_on(scene, &how, options.make.clone()) {
+    let guard = match run::run_on(scene, &how, options.config.clone()) {
         Ok(outcome) if outcome.interrupted => return Ok(None),
         Ok(_) => None,
         Err(Error::Guard(guard)) => Some(guard),
@@ -201,14 +201,14 @@ fn compare(name: &'static str, variant: &Done, whole: &Done, measures: &[&Measur
 fn start(done: &Done, options: &Options) -> Result<Option<Simulation>> {
     let steps = &done.loaded.case.steps;
     let Some(before) = steps.len().checked_sub(2) else {
-        return run::simulation(&done.loaded, trial(&options.make)).map(Some);
+        return run::simulation(&done.loaded, trial(&options.config)).map(Some);
     };
     let end = format!("-{}-{}.state", before + 1, steps[before].name());
     let states = done.folder.join("state");
     let entries = std::fs::read_dir(&states).map_err(|e| Error::file(&states, e))?;
     let mut paths = entries.filter_map(|entry| entry.ok().map(|entry| entry.path()));
     let found = paths.find(|path| path.to_string_lossy().ends_with(&end));
-    found.map(|state| run::simulation_at(&done.loaded, trial(&options.make), &state)).transpose()
+    found.map(|state| run::simulation_at(&done.loaded, trial(&options.config), &state)).transpose()
 }
 
 /// The table for a person.

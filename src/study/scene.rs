@@ -2,12 +2,12 @@
 //! hold.
 
 use crate::case::expect::{Expect, Quantity, Verdict};
-use crate::case::read::read;
 use crate::error::{Error, Result};
 use crate::mesh::{Mesh, vector};
+use crate::rigs::read::read;
 use crate::run;
 use crate::schedule::Phase;
-use crate::simulate::{Energies, Make, Retries, Simulation};
+use crate::simulate::{BackendConfig, Energies, Retries, Simulation};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -46,7 +46,7 @@ pub struct Observed {
 
 /// Scenes on one machine; each is run once.
 pub struct Scenes {
-    make: Make,
+    config: BackendConfig,
     /// Steps after which a scene is left.
     longest: u64,
     /// By case and overrides.
@@ -54,8 +54,8 @@ pub struct Scenes {
 }
 
 impl Scenes {
-    pub fn new(make: Make) -> Self {
-        Self { make, longest: u64::MAX, seen: BTreeMap::new() }
+    pub fn new(config: BackendConfig) -> Self {
+        Self { config, longest: u64::MAX, seen: BTreeMap::new() }
     }
 
     /// Leaves every scene after so many steps.
@@ -70,11 +70,11 @@ impl Scenes {
     pub fn examine(&mut self, path: &Path, overrides: &[String]) -> Result<(Observed, Vec<String>)> {
         let loaded = read(path, overrides)?;
         let mut case = loaded.clone();
-        case.case.integration.precision = self.make.precision;
+        case.case.integration.precision = self.config.precision;
         let key = (path.to_path_buf(), overrides.to_vec());
         let observed = match self.seen.get(&key) {
             Some(observed) => observed.clone(),
-            None => observe(run::simulation(&case, self.make.clone())?, self.longest)?,
+            None => observe(run::simulation(&case, self.config.clone())?, self.longest)?,
         };
         self.seen.insert(key, observed.clone());
         let Some(expect) = &loaded.case.expect else { return Ok((observed, Vec::new())) };
@@ -243,14 +243,14 @@ impl Observed {
         self.drift = now.iter().zip(before).map(|(a, b)| vector::norm(vector::sub(*a, *b))).fold(0.0, f64::max);
         self.displacements = now.iter().map(|w| vector::norm(*w)).collect();
         self.displacements.sort_by(f64::total_cmp);
-        self.thickness_ratio = thickness_ratio(&s.mesh, &now);
+        self.thickness_ratio = thickness_ratio(&s.mesh(), &now);
         let tensions = s.tensions();
         self.tension = tensions.iter().copied().fold(f64::NAN, f64::max);
     }
 
     /// Takes note of how a thread slides.
     fn slide(&mut self, s: &Simulation) {
-        if let Some(thread) = s.mesh.threads.first() {
+        if let Some(thread) = s.mesh().threads.first() {
             let tensions = s.tensions();
             self.tension_ratios.push(tensions[thread.count - 2] / tensions[0]);
         }

@@ -2,11 +2,11 @@
 
 use super::scene::Scenes;
 use crate::backend::gpu::Device;
-use crate::case::steps::Precision;
 use crate::error::{Error, Result};
 use crate::output::table::Table;
 use crate::run::Machine;
-use crate::simulate::Make;
+use crate::settings::integration::Precision;
+use crate::simulate::BackendConfig;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -36,8 +36,8 @@ pub struct Study {
 
 /// The machines that scenes are run on, with their names: the CPU in both precisions, and an adapter. By itself a study takes
 /// the adapter if there is one.
-fn machines(wanted: Machine) -> Result<Vec<(&'static str, Make)>> {
-    let cpu = |precision| Make { precision, ..Make::default() };
+fn machines(wanted: Machine) -> Result<Vec<(&'static str, BackendConfig)>> {
+    let cpu = |precision| BackendConfig { precision, ..BackendConfig::default() };
     let mut machines = Vec::new();
     if wanted != Machine::Gpu {
         machines = vec![("cpu f32", cpu(Precision::F32)), ("cpu f64", cpu(Precision::F64))];
@@ -47,7 +47,7 @@ fn machines(wanted: Machine) -> Result<Vec<(&'static str, Make)>> {
         Machine::Gpu => Some(Device::open("")?),
         Machine::Auto => Device::open("").ok(),
     };
-    machines.extend(device.map(|device| ("gpu", Make { device: Some(device), ..Make::default() })));
+    machines.extend(device.map(|device| ("gpu", BackendConfig { device: Some(device), ..BackendConfig::default() })));
     Ok(machines)
 }
 
@@ -78,8 +78,8 @@ pub fn stability(folder: &Path, machine: Machine, longest: Option<u64>, table: &
     }
     let mut rows = Table::create(table, STABILITY)?;
     let (mut text, mut failed) = (String::new(), 0);
-    for (machine, make) in machines {
-        let mut scenes = Scenes::new(make).longest(longest.unwrap_or(u64::MAX));
+    for (machine, config) in machines {
+        let mut scenes = Scenes::new(config).longest(longest.unwrap_or(u64::MAX));
         for path in &paths {
             let (seen, mut broken) = scenes.examine(path, &[])?;
             if seen.cut {

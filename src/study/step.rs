@@ -4,12 +4,13 @@
 //! own mass. The estimate counts the mass of the step in use. So that both speak of one scene, steps here may grow to
 //! [`LIFTED`] times the longest that the case allows, in effect to what the estimate says.
 
-use crate::case::read::Loaded;
-use crate::case::steps::{Precision, Step};
 use crate::error::{Error, Result};
+use crate::rigs::read::Loaded;
 use crate::run;
 use crate::schedule::Schedule;
-use crate::simulate::{Make, Simulation};
+use crate::settings::integration::Precision;
+use crate::settings::steps::Step;
+use crate::simulate::{BackendConfig, Simulation};
 use std::fmt::Write as _;
 
 /// Steps within which one that is too long must show.
@@ -108,7 +109,8 @@ pub fn longest_step(loaded: &Loaded, scene: &mut Simulation, most: f64) -> Resul
         trial.case.integration.dt_s = Some(dt);
         trial.case.steps.truncate(phase + 1);
         trial.case.steps.push(Step::Hold { time_s: 2.0 * TRIAL as f64 * dt });
-        let mut scene = run::simulation(&trial, Make { precision: Precision::F64, ..Make::default() })?;
+        let mut scene =
+            run::simulation(&trial, BackendConfig { precision: Precision::F64, ..BackendConfig::default() })?;
         scene.restore(host.clone(), &names, &contents)?;
         let until = scene.time() + TRIAL as f64 * dt;
         match scene.advance(until, |_| false) {
@@ -137,7 +139,7 @@ pub fn step(loaded: &Loaded, every_deg: f64, confirm: bool) -> Result<Study> {
     let mut loaded = loaded.clone();
     loaded.case.integration.precision = Precision::F64;
     loaded.case.integration.dt_max_s *= LIFTED;
-    let mut scene = run::simulation(&loaded, Make { precision: Precision::F64, ..Make::default() })?;
+    let mut scene = run::simulation(&loaded, BackendConfig { precision: Precision::F64, ..BackendConfig::default() })?;
     let (mut text, mut held) = (String::new(), true);
     let moments = moments(&scene.schedule, every_deg);
     let first_end = scene.schedule.phases().first().map_or(0.0, |phase| phase.end);

@@ -5,10 +5,10 @@ pub mod program;
 
 use serde_json::{Value, json};
 use std::path::PathBuf;
-use tricot::case::read::{Loaded, read};
-use tricot::case::steps::Precision;
+use tricot::rigs::read::{Loaded, read};
 use tricot::run::{self, Machine, Options};
-use tricot::simulate::{Make, Simulation};
+use tricot::settings::integration::Precision;
+use tricot::simulate::{BackendConfig, Simulation};
 
 /// Prints a number beside what it should be, and fails if it is further away than `tolerance` times that (or than
 /// `tolerance` itself where zero is expected).
@@ -37,7 +37,8 @@ pub fn loaded(case: &Value) -> Loaded {
 
 /// A case on one thread, in a precision.
 pub fn start(case: &Value, precision: Precision) -> Simulation {
-    run::simulation(&loaded(case), Make { precision, threads: 1, ..Make::default() }).unwrap_or_else(|e| panic!("{e}"))
+    run::simulation(&loaded(case), BackendConfig { precision, threads: 1, ..BackendConfig::default() })
+        .unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Goes on to a time without looking.
@@ -172,7 +173,7 @@ pub fn forces(simulation: &Simulation) -> Vec<[f64; 3]> {
 /// Current positions of all nodes, mm.
 pub fn positions(simulation: &Simulation) -> Vec<[f64; 3]> {
     let moved = simulation.fluctuations();
-    simulation.mesh.nodes.iter().zip(moved).map(|(x, w)| [0, 1, 2].map(|k| x[k] + w[k])).collect()
+    simulation.mesh().nodes.iter().zip(moved).map(|(x, w)| [0, 1, 2].map(|k| x[k] + w[k])).collect()
 }
 
 pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

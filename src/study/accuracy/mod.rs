@@ -1,13 +1,13 @@
 //! `tricot study accuracy`: what accuracy costs in time, for the user's own case.
 //!
-//! [`turns`] lists the knobs as data, [`points`] makes a run of each, `stopwatch` times it on a machine that may have other work
+//! [`variations`] lists the knobs as data, [`points`] makes a run of each, `stopwatch` times it on a machine that may have other work
 //! to do, [`findings`] compares the runs with the reference, and `write` puts that on disk. A run that is there already is not
 //! run again, so a study that was stopped goes on.
 
 pub mod findings;
 pub mod points;
 mod stopwatch;
-pub mod turns;
+pub mod variations;
 mod write;
 
 use crate::case::parse::reason;

@@ -2,16 +2,17 @@
 
 use super::Options;
 use super::stopwatch::{Clocks, Stopwatch};
-use super::turns::{CHANCE, Flags, PLACES, REFERENCE, Turn, chosen};
+use super::variations::{CHANCE, Flags, PLACES, REFERENCE, Variation, chosen};
 use crate::backend::gpu;
 use crate::case::differences::differences;
 use crate::case::parse;
-use crate::case::read::{Loaded, read};
-use crate::case::steps::{Precision, Step};
 use crate::error::{Error, Result};
 use crate::output::checkpoint::FOLDER;
 use crate::output::file;
+use crate::rigs::read::{Loaded, read};
 use crate::run::{self, CASE, Machine};
+use crate::settings::integration::Precision;
+use crate::settings::steps::Step;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -125,13 +126,13 @@ impl<'a> Runner<'a> {
     /// A choice of points that is none.
     pub(super) fn points(&self) -> Result<Vec<Point>> {
         let own = Point { role: Role::Default, knob: "default", label: "default", flags: Flags::default() };
-        let point = |role: Role, turn: &'static Turn| {
-            let flags = turn.flags(&self.default, self.phases)?;
-            Some(Point { role, knob: turn.knob, label: turn.label, flags })
+        let point = |role: Role, variation: &'static Variation| {
+            let flags = variation.flags(&self.default, self.phases)?;
+            Some(Point { role, knob: variation.knob, label: variation.label, flags })
         };
-        let turned = chosen(&self.options.points)?.into_iter().filter_map(|turn| {
-            let role = if turn.knob == REFERENCE.knob { Role::Check } else { Role::Turned };
-            point(role, turn)
+        let turned = chosen(&self.options.points)?.into_iter().filter_map(|variation| {
+            let role = if variation.knob == REFERENCE.knob { Role::Check } else { Role::Turned };
+            point(role, variation)
         });
         let differs = |p: &Point| {
             let same_threads = p.flags.threads.is_some() && p.flags.threads == self.options.threads;
@@ -139,8 +140,8 @@ impl<'a> Runner<'a> {
             !same_threads && !same_machine
         };
         let mut points = vec![own];
-        points.extend(CHANCE.iter().filter_map(|turn| point(Role::Chance, turn)));
-        points.extend(PLACES.iter().filter_map(|turn| point(Role::Places, turn)));
+        points.extend(CHANCE.iter().filter_map(|variation| point(Role::Chance, variation)));
+        points.extend(PLACES.iter().filter_map(|variation| point(Role::Places, variation)));
         points.extend(point(Role::Reference, &REFERENCE));
         points.extend(turned.filter(differs));
         Ok(points)

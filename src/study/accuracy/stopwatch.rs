@@ -2,11 +2,11 @@
 //! told in steps of that scene. What slows both down drops out. Time that the processors give to others is not counted at all by the
 //! second clock.
 
-use crate::case::read::read;
-use crate::case::steps::Precision;
 use crate::error::{Error, Result};
+use crate::rigs::read::read;
 use crate::run::{self, clock};
-use crate::simulate::{Make, Simulation};
+use crate::settings::integration::Precision;
+use crate::simulate::{BackendConfig, Simulation};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -79,7 +79,8 @@ impl Stopwatch {
         if let Some(first) = loaded.case.steps.first_mut() {
             *first.time_mut() = longest;
         }
-        let scene = run::simulation(&loaded, Make { threads: threads.unwrap_or(0), ..Make::default() })?;
+        let scene =
+            run::simulation(&loaded, BackendConfig { threads: threads.unwrap_or(0), ..BackendConfig::default() })?;
         let mut stopwatch = Self {
             scene,
             start: Instant::now(),

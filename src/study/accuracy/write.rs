@@ -2,7 +2,7 @@
 
 use super::findings::{Findings, Row};
 use super::points::Role;
-use super::turns::TURNS;
+use super::variations::VARIATIONS;
 use crate::error::Result;
 use crate::output::file;
 use crate::output::page::Page;
@@ -132,7 +132,7 @@ impl Report<'_> {
     fn chart(&self, measure: usize) -> Option<String> {
         let f = self.findings;
         let name = f.measures.get(measure)?.name;
-        let mut knobs: Vec<&str> = TURNS.iter().map(|turn| turn.knob).collect();
+        let mut knobs: Vec<&str> = VARIATIONS.iter().map(|variation| variation.knob).collect();
         knobs.dedup();
         let mut marks = Vec::new();
         for (number, row) in f.rows.iter().enumerate().filter(|(_, row)| row.is_offer()) {

@@ -1,0 +1,97 @@
+//! How fast nodes are, whether they are still numbers in range, and with contact how far they have travelled since there was last
+//! a look around for candidates.
+//!
+//! There is one as soon as a node has travelled by [`SKIN_USED`] of the contact skin. It searches again only where bodies have moved
+//! relative to each other: since the last search of everything, all nodes have noted where they were then, and candidates
+//! from then are good as long as nothing in reach has moved by more than [`SKIN_APART`] relative to its carrier. What is carried
+//! along with its surroundings, as by the clamp of a specimen, is not searched. One that was searched since then is searched at
+//! every look, until enough are for a search of everything to pay.
+//!
+//! A pair that is in no list was farther apart than reach and skin when the list was made. Since then it has come closer by at most
+//! `SKIN_APART` until the last look, as much by the affine motion of a periodic cell, and 2 × `SKIN_USED` since. The rest of the
+//! skin is for what nodes travel before the look that is due.
+
+use super::status;
+use crate::kernel::lane::{Lane, Real};
+use crate::kernel::node::Field;
+use crate::kernel::position::{MOST_MM, difference, in_mm};
+use crate::kernel::shader::{Shader, when};
+use crate::kernel::stage::{Io, Kernel, raise};
+use crate::kernel::vector::dot;
+use std::ops::Range;
+use std::sync::atomic::Ordering;
+
+pub const QUANTA: usize = 0;
+pub const REMAINDER: usize = 1;
+/// Displacements at the last look; [`Travel`] reads the velocity first, and these only with contact.
+pub const SEARCH_QUANTA: usize = 2;
+pub const SEARCH_REMAINDER: usize = 3;
+
+/// Share of the contact skin that nodes may travel before a look.
+pub const SKIN_USED: f64 = 0.25;
+/// And the one that bodies may have moved relative to each other since candidates were searched.
+pub const SKIN_APART: f64 = 0.5 * SKIN_USED;
+
+/// Notes displacements at a look.
+pub struct Remember;
+/// Raises the largest speed; with `CONTACT` also the largest distance travelled since the last look.
+pub struct Travel<const CONTACT: bool>;
+
+impl Kernel for Remember {
+    const SHADER: Shader = Shader::new("contact/skin", "remember");
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let (quanta, remainder) = (io.ints(QUANTA), io.scalars(REMAINDER));
+        let mut search_quanta = io.own::<i32>(SEARCH_QUANTA);
+        let mut search_remainder = io.own::<L::Scalar>(SEARCH_REMAINDER);
+        let plane = remainder.len() / 3;
+        for node in items {
+            for k in 0..3 {
+                *search_quanta.at(k, node) = quanta[node + k * plane];
+                *search_remainder.at(k, node) = remainder[node + k * plane];
+            }
+        }
+    }
+}
+
+impl<const CONTACT: bool> Kernel for Travel<CONTACT> {
+    const SHADER: Shader = Shader { defines: &[when(CONTACT, "CONTACT")], ..Shader::new("contact/skin", "travel") };
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        const VELOCITY: usize = 2;
+        let (quanta, remainder) = (io.ints(QUANTA), io.scalars(REMAINDER));
+        let searched = CONTACT.then(|| (io.ints(SEARCH_QUANTA + 1), io.scalars(SEARCH_REMAINDER + 1)));
+        let status = io.atomic_uints(if CONTACT { 5 } else { 3 });
+        let plane = remainder.len() / 3;
+        let velocity = Field::new(io, VELOCITY);
+        let (mut largest, mut fastest) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(0.0));
+        for node in items {
+            let (mut square, mut furthest) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(0.0));
+            let mut far = L::Scalar::from_f64(0.0);
+            for k in 0..3 {
+                let i = node + k * plane;
+                if let Some((search_quanta, search_remainder)) = searched {
+                    let d = difference(quanta[i], remainder[i], search_quanta[i], search_remainder[i]);
+                    square = square + d * d;
+                }
+                let moved = in_mm(quanta[i], remainder[i]);
+                far = far + moved * moved;
+                furthest = furthest.max(moved.abs());
+            }
+            if !far.is_finite() {
+                status[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
+            } else if furthest > L::Scalar::from_f64(MOST_MM) {
+                status[status::FLAGS].fetch_or(status::OUT_OF_RANGE, Ordering::Relaxed);
+            }
+            largest = largest.max(square);
+            let v = velocity.at(node);
+            fastest = fastest.max(dot(v, v));
+        }
+        if CONTACT {
+            raise(&status[status::TRAVEL], largest.sqrt());
+        }
+        raise(&status[status::SPEED], fastest.sqrt());
+    }
+}

@@ -1,0 +1,185 @@
+//! What the pull of a specimen shows, in sentences with their numbers: zones, how far the effective angle stays behind the
+//! theory without slip, widths and gaps, sliding at the free edges, and which stitches carry.
+
+use super::strip;
+use crate::case::Case;
+use crate::case::domain::Specimen;
+use crate::error::{Error, Result};
+use crate::fabric;
+use crate::measure::stitches::{Leg, SLACK_BELOW_N, legs};
+use crate::measure::zones::Zone;
+use crate::mesh::{Mesh, Part, Ply};
+use crate::output::columns::Columns;
+use crate::output::results::Results;
+use crate::output::vtu_read;
+use crate::rigs::crossings::MARGIN;
+
+/// Angles of Eq. 18 at which the effective angle is stated, degrees.
+const STATED_DEG: [f64; 5] = [10.0, 20.0, 25.0, 30.0, 45.0];
+/// Frames of the pull whose stitches are counted, the last one included.
+const FRAMES: usize = 4;
+
+/// Sentences about the pull; none before it begins.
+///
+/// # Errors
+/// Files of the run that cannot be read.
+pub(super) fn findings(specimen: &Specimen, case: &Case, results: &Results) -> Result<Vec<String>> {
+    let Some(shear) = results.other("shear.csv")? else { return Ok(Vec::new()) };
+    let phases = results.history.texts("phase");
+    let rows: Vec<usize> = (0..phases.len().min(shear.len())).filter(|r| phases[*r] == "move").collect();
+    let (Some(&first), Some(&last)) = (rows.first(), rows.last()) else { return Ok(Vec::new()) };
+    let pull = Pull { before: first.saturating_sub(1), rows, last, shear };
+    let plies = ["warp", "weft"];
+    let sentences = [pull.zones(), pull.lag()].into_iter().chain(plies.map(|ply| pull.widths(ply)));
+    let mut found: Vec<String> = sentences.chain(plies.map(|ply| pull.gaps(ply))).flatten().collect();
+    found.extend(edges(specimen, results)?);
+    found.extend(stitches(specimen, case, results)?);
+    Ok(found)
+}
+
+/// Slip at the free edges beside that inside, at the last frame.
+fn edges(specimen: &Specimen, results: &Results) -> Result<Option<String>> {
+    let Some(table) = results.other("crossings.csv")?.filter(|t| !t.is_empty()) else { return Ok(None) };
+    let width = specimen.width_mm;
+    let (times, zones) = (table.texts("time_s"), table.texts("zone"));
+    let [x, y, across] = ["slip_x_mm", "slip_y_mm", "reference_y_mm"].map(|name| table.numbers(name));
+    let mean = |zone: &str, edge: bool| -> String {
+        let own = (0..times.len()).filter(|&i| {
+            let at_edge = across[i].abs() > (0.5 - MARGIN) * width;
+            times[i] == times[times.len() - 1] && zones[i] == zone && at_edge == edge
+        });
+        let slips: Vec<f64> = own.map(|i| x[i].hypot(y[i])).filter(|slip| slip.is_finite()).collect();
+        match slips.len() {
+            0 => "none".into(),
+            count => format!("{:.3}", slips.iter().sum::<f64>() / count as f64),
+        }
+    };
+    let each = ["A", "B", "C"].map(|zone| format!("{zone} {} / {}", mean(zone, true), mean(zone, false)));
+    let margin = MARGIN * width;
+    Ok(Some(format!(
+        "Slip of the plies within {margin:.0} mm of the free edges / farther inside, mm: {}",
+        each.join(", ")
+    )))
+}
+
+/// Which stitches of zone C carry, at some frames of the pull.
+fn stitches(specimen: &Specimen, case: &Case, results: &Results) -> Result<Vec<String>> {
+    let mesh = fabric::specimen::build(case, case.fabric()?, specimen)?;
+    let collection = results.dir.join("run.pvd");
+    if mesh.threads.is_empty() || !collection.is_file() {
+        return Ok(Vec::new());
+    }
+    let strip = strip(specimen);
+    let yarns = [Ply::Warp, Ply::Weft].map(|ply| direction(&mesh, ply));
+    let mut frames = Vec::new();
+    for path in vtu_read::read_collection(&collection)? {
+        let frame = vtu_read::read(&path, &mesh)?;
+        if frame.displacement_mm > 0.0 {
+            frames.push((path, frame));
+        }
+    }
+    let Some(last) = frames.len().checked_sub(1) else { return Ok(Vec::new()) };
+    let count = FRAMES.min(frames.len());
+    let chosen = (1..=count).map(|k| &frames[last * k / count]);
+    chosen
+        .map(|(path, frame)| {
+            let tension = frame.beam_fields.iter().find(|f| f.name == "tension_n");
+            let tension = tension.ok_or_else(|| Error::file(path, "holds no tension_n"))?;
+            let legs = legs(&mesh, &tension.values)?;
+            let inside: Vec<&Leg> = legs.iter().filter(|l| strip.zone(l.middle, yarns) == Zone::C).collect();
+            Ok(format!("Stitches of zone C at {:.2} mm: {}", frame.displacement_mm, carried(&inside)))
+        })
+        .collect()
+}
+
+/// How many legs there are, their mean tension and which share of them is taut, by kind.
+fn carried(legs: &[&Leg]) -> String {
+    let share = |name: &str, own: &dyn Fn(&Leg) -> bool| {
+        let own: Vec<_> = legs.iter().filter(|l| own(l)).collect();
+        let share = |count: usize| 100.0 * count as f64 / own.len() as f64;
+        let mean = own.iter().map(|l| l.force_n).sum::<f64>() / own.len() as f64;
+        let taut = share(own.iter().filter(|l| l.taut()).count());
+        format!("{} {name} {mean:.3} N, {taut:.0} % taut", own.len())
+    };
+    let along = |l: &Leg| l.chord[0].abs() > l.chord[1].abs();
+    [
+        share("loops", &|l| l.part == Part::Loop),
+        share("underlaps along the pull", &|l| l.part == Part::Underlap && along(l)),
+        share("underlaps across it", &|l| l.part == Part::Underlap && !along(l)),
+    ]
+    .join("; ")
+        + &format!(" (from {SLACK_BELOW_N} N)")
+}
+
+/// Direction of the fibres of a ply in the plane.
+fn direction(mesh: &Mesh, ply: Ply) -> [f64; 2] {
+    mesh.blocks.iter().find(|b| b.ply == ply).map_or([f64::NAN; 2], |b| [b.fibre[0], b.fibre[1]])
+}
+
+/// The rows of the pull.
+struct Pull {
+    shear: Columns,
+    rows: Vec<usize>,
+    /// The last row before, and the last of all.
+    before: usize,
+    last: usize,
+}
+
+impl Pull {
+    fn column(&self, name: &str) -> Vec<f64> {
+        self.shear.numbers(name)
+    }
+
+    /// `None`, as of the others, where no crossing lies well inside a zone.
+    fn zones(&self) -> Option<String> {
+        let at = |zone: &str| self.column(&format!("zone_{zone}_angle_deg"))[self.last];
+        let [a, b, c] = ["a", "b", "c"].map(at);
+        let way = self.column("displacement_mm")[self.last];
+        let theory = self.column("theory_angle_deg")[self.last];
+        let known = [a, b, c, theory].iter().all(|angle| angle.is_finite());
+        known.then(|| format!(
+            "Zones A / B / C have sheared by {a:.1} / {b:.1} / {c:.1}° at {way:.2} mm ({:.2} and {:.2} of C); without slip none, \
+             half and all of {theory:.1}° (Eq. 18)",
+            a / c,
+            b / c
+        ))
+    }
+
+    /// The effective angle of zone C beside Eq. 18.
+    fn lag(&self) -> Option<String> {
+        let [effective, theory] = ["zone_c_angle_deg", "theory_angle_deg"].map(|name| self.column(name));
+        let stated = STATED_DEG.iter().filter_map(|stated| {
+            let row = self.rows.iter().find(|&&row| theory[row] >= *stated)?;
+            Some(format!("{:.1} at {:.1}°", effective[*row], theory[*row]))
+        });
+        let stated: Vec<String> = stated.collect();
+        (!stated.is_empty()).then(|| format!("Effective angle in zone C where Eq. 18 has more: {}", stated.join(", ")))
+    }
+
+    fn widths(&self, ply: &str) -> Option<String> {
+        let width = self.column(&format!("zone_c_{ply}_width_mm"));
+        let mut narrowest = width[self.before];
+        let mut rise = 0.0f64;
+        for &row in &self.rows {
+            narrowest = narrowest.min(width[row]);
+            rise = rise.max(width[row] - narrowest);
+        }
+        let known = width[self.before].is_finite() && width[self.last].is_finite();
+        known.then(|| format!(
+            "Width of the {ply} in zone C: {:.3} mm before, {:.3} mm at the end; no row is more than {rise:.3} mm above an earlier one",
+            width[self.before], width[self.last]
+        ))
+    }
+
+    fn gaps(&self, ply: &str) -> Option<String> {
+        let (gap, angle) = (self.column(&format!("zone_c_{ply}_gap_mm")), self.column("zone_c_angle_deg"));
+        let widest = self.rows.iter().copied().max_by(|&a, &b| gap[a].total_cmp(&gap[b])).unwrap_or(self.last);
+        let known = [gap[self.before], gap[widest], gap[self.last]].iter().all(|gap| gap.is_finite());
+        known.then(|| {
+            format!(
+                "Gap of the {ply} in zone C: {:.3} mm before, largest {:.3} mm at {:.1}°, {:.3} mm at the end",
+                gap[self.before], gap[widest], angle[widest], gap[self.last]
+            )
+        })
+    }
+}

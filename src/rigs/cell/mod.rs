@@ -1,0 +1,45 @@
+//! The periodic cell: homogenised shear of a piece of fabric without edges.
+
+mod check;
+mod observer;
+mod page;
+
+use super::observer::{Observer, Tables};
+use super::{Piece, Rig, crossings};
+use crate::case::Case;
+use crate::case::domain::Cell;
+use crate::case::provenance::Provenance;
+use crate::error::Result;
+use crate::fabric;
+use crate::output::page::Page;
+use crate::output::results::Results;
+use crate::simulate::Simulation;
+
+impl Rig for Cell {
+    fn check(&self, case: &Case, provenance: &Provenance) -> Result<()> {
+        check::check(case, self, provenance)
+    }
+
+    fn piece(&self, case: &Case) -> Result<Piece> {
+        let mesh = fabric::cell::build(case, case.fabric()?, self.warps, self.wefts)?;
+        Ok(Piece { mesh, ..Piece::default() })
+    }
+
+    fn observer(&self, case: &Case, simulation: &Simulation, tables: &Tables) -> Result<Box<dyn Observer>> {
+        Ok(Box::new(observer::Sheared::of(case.fabric()?, simulation, tables)?))
+    }
+
+    fn curves(&self, results: &Results, page: &mut Page) -> Result<()> {
+        page::curves(results, page)
+    }
+
+    fn sections(&self, _: &Case, results: &Results, page: &mut Page) -> Result<Vec<String>> {
+        crossings::maps(results, page, 1)?;
+        Ok(Vec::new())
+    }
+
+    fn columns(&self, results: &Results) -> Vec<&'static str> {
+        let axis = results.axis();
+        vec![axis.column, if axis.is_angle() { "f_nor_n_per_mm" } else { "force_n" }]
+    }
+}

@@ -1,0 +1,224 @@
+//! A cell while it is sheared: F_nor, homogenised stress, membrane forces, crossings, and the sizes of its yarns.
+
+use crate::case::fabric::Fabric;
+use crate::error::Result;
+use crate::kernel::record::{Record, Recorded};
+use crate::measure::{shear, yarns};
+use crate::mesh::Ply;
+use crate::mesh::frame::Frame;
+use crate::output::table::{STRESS, Table};
+use crate::rigs::crossings::Crossed;
+use crate::rigs::observer::{Loading, Observer, Seen, Tables};
+use crate::settings::steps::Step;
+use crate::simulate::Simulation;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Angle after which the kinetic energy of shear is judged, degrees.
+const SETTLED_DEG: f64 = 2.0;
+/// Diagonal of the cell towards which positive shear turns its yarns.
+const DIAGONAL: [f64; 2] = [1.0, 1.0];
+/// Angles at which the last lines state F_nor, degrees, and the distance from them that counts.
+const STATED_DEG: [f64; 5] = [5.0, 15.0, 25.0, 35.0, 45.0];
+const NEAR_DEG: f64 = 1.0;
+
+/// What a cell adds to a run.
+pub(super) struct Sheared {
+    /// Reference area, mm².
+    area: f64,
+    stress: Table,
+    crossings: Option<Crossed>,
+    /// Sizes of warp and weft in the real fabric, for the last lines.
+    measured: [String; 2],
+    /// Shear angle, degrees, and F_nor, N/mm, at the rows of shear.
+    curve: Vec<(f64, f64)>,
+    /// Shear angle (rad) and external work (mJ) at the last row.
+    last: [f64; 2],
+    /// Squares of the errors of the membrane forces along x and y, (N/mm)², summed over the rows of shear, and their number.
+    missed: [f64; 3],
+    /// Mean width, thickness and gap of warp and weft before shear, mm.
+    settled: Option<[[f64; 3]; 2]>,
+}
+
+impl Sheared {
+    pub(super) fn of(fabric: &Fabric, simulation: &Simulation, tables: &Tables) -> Result<Self> {
+        let mesh = simulation.mesh();
+        let measured = |yarn: &crate::case::fabric::Yarn| {
+            let measured = yarn.measured.as_ref();
+            measured.map_or(String::new(), |m| format!(" ({} {})", m.by, m.texts().join(" / ")))
+        };
+        Ok(Self {
+            area: mesh.period.map_or(f64::NAN, |[x, y]| x * y),
+            stress: tables.open("stress.csv", STRESS)?,
+            crossings: Crossed::of(mesh, DIAGONAL, None, tables)?,
+            measured: [&fabric.warp, &fabric.weft].map(measured),
+            curve: Vec::new(),
+            last: [0.0; 2],
+            missed: [0.0; 3],
+            settled: None,
+        })
+    }
+
+    /// F_nor from V P̄, N/mm.
+    fn force(&mut self, simulation: &Simulation, stress: [[f64; 3]; 3]) -> f64 {
+        let (angle, work) = (simulation.load().angle, simulation.energies().external);
+        let [before, done] = std::mem::replace(&mut self.last, [angle, work]);
+        let turned = libm::sin(angle) - libm::sin(before);
+        if turned.abs() > 1e-9 {
+            // the mean over the row: ∫ A₀ F_nor cos γ dγ is the external work
+            return (work - done) / (self.area * turned);
+        }
+        shear::normalised_force(in_plane(stress), angle, simulation.stretch(), self.area)
+    }
+
+    /// Sizes of yarns before shear, for the last lines.
+    fn settle(&mut self, simulation: &Simulation) -> Result<()> {
+        let frame = simulation.frame();
+        simulation.alive()?;
+        let yarns = yarns::measure(simulation.mesh(), &frame)?;
+        let means = |p: yarns::Sizes| [p.width.mean, p.thickness.mean, p.gap.mean];
+        self.settled = Some([Ply::Warp, Ply::Weft].map(|ply| means(yarns::ply(&yarns, ply))));
+        Ok(())
+    }
+
+    /// Root mean square by which the membrane force along x or y missed its aim over the rows of shear, N/mm; `None` without an aim.
+    fn missed(&self, simulation: &Simulation, axis: usize) -> Option<f64> {
+        let rows = self.missed[2];
+        let driven = simulation.fibres()[axis].error.is_some() && rows > 0.0;
+        driven.then(|| libm::sqrt(self.missed[axis] / rows))
+    }
+
+    /// F_nor at the stated angles.
+    fn forces(&self) -> Vec<String> {
+        // on the way out: coming back is another curve
+        let mut furthest = 0.0f64;
+        let is_new = |(angle, _): &&(f64, f64)| {
+            let is_new = angle.abs() >= furthest;
+            furthest = furthest.max(angle.abs());
+            is_new
+        };
+        let out: Vec<&(f64, f64)> = self.curve.iter().filter(is_new).collect();
+        let at = |angle: f64| {
+            let near = out.iter().filter(|(a, _)| (a.abs() - angle).abs() <= NEAR_DEG).map(|(_, f)| *f);
+            let (sum, count) = near.fold((0.0, 0), |(s, n), f| (s + f, n + 1));
+            (count > 0).then(|| format!("{:.4} at {angle}°", sum / f64::from(count)))
+        };
+        STATED_DEG.into_iter().filter_map(at).collect()
+    }
+}
+
+impl Observer for Sheared {
+    fn start(&mut self, simulation: &Simulation, behind: &[Step]) -> Result<()> {
+        self.last = [simulation.load().angle, simulation.energies().external];
+        if behind.iter().any(|step| matches!(step, Step::Shear { .. })) {
+            return Ok(());
+        }
+        self.settle(simulation)
+    }
+
+    fn row(&mut self, simulation: &mut Simulation, seen: &Seen) -> Result<Loading> {
+        let time = simulation.time();
+        let degrees = simulation.load().angle.to_degrees();
+        let stress = simulation.take_stress().unwrap_or_default();
+        // a mean over the row belongs to its middle
+        let middle = 0.5 * (self.last[0] + simulation.load().angle);
+        let normalised = self.force(simulation, stress);
+        if seen.phase == "shear" {
+            self.curve.push((degrees, normalised));
+            for (sum, fibres) in self.missed.iter_mut().zip(simulation.fibres()) {
+                *sum += fibres.error.map_or(0.0, |error| error * error);
+            }
+            self.missed[2] += 1.0;
+        }
+        let stretches = simulation.stretch();
+        let membrane = shear::membrane_forces(in_plane(stress), middle, self.area);
+        let numbers = [time, degrees].into_iter().chain(stress.concat().into_iter().map(|p| p / self.area));
+        self.stress.numbers(&numbers.chain(stretches).chain(membrane).collect::<Vec<_>>())?;
+        if let (Some(crossed), Some((frame, yarns))) = (&mut self.crossings, seen.yarns) {
+            let crossings = crossed.measure(simulation.mesh(), frame, yarns)?;
+            crossed.write_row([time, degrees, simulation.displacement()], &crossings, f64::NAN)?;
+        }
+        Ok(Loading { degrees, force: seen.machine, normalised })
+    }
+
+    fn end_of_step(&mut self, simulation: &Simulation, step: &Step) -> Result<()> {
+        if matches!(step, Step::Shear { .. }) { Ok(()) } else { self.settle(simulation) }
+    }
+
+    fn frame(&mut self, simulation: &Simulation, frame: &mut Frame, dir: &Path, name: &str) -> Result<()> {
+        self.crossings.as_mut().map_or(Ok(()), |crossed| crossed.frame(simulation.mesh(), frame, dir, name))
+    }
+
+    fn is_loaded(&self, simulation: &Simulation, phase: &str) -> bool {
+        phase == "shear" && simulation.load().angle.to_degrees().abs() > SETTLED_DEG
+    }
+
+    fn tables(&mut self) -> Vec<&mut Table> {
+        let crossings = self.crossings.iter_mut().flat_map(|crossed| &mut crossed.tables);
+        std::iter::once(&mut self.stress).chain(crossings).collect()
+    }
+
+    fn record(&mut self, record: &mut Record) {
+        let Self { crossings, curve, last, missed, settled, area: _, stress: _, measured: _ } = self;
+        if let Some(crossed) = crossings {
+            crossed.maps.record(record);
+        }
+        curve.record(record);
+        last.record(record);
+        missed.record(record);
+        settled.record(record);
+    }
+
+    /// Stretch and membrane force along the fibres, by ply.
+    fn summary(&self, simulation: &Simulation) -> Vec<(&'static str, Value)> {
+        let [weft, warp] = [0, 1].map(|axis| {
+            let fibres = simulation.fibres()[axis];
+            json!({
+                "stretch": fibres.stretch,
+                "membrane_n_per_mm": fibres.force,
+                "error_in_shear_n_per_mm": self.missed(simulation, axis),
+            })
+        });
+        vec![("fibres", json!({ "warp": warp, "weft": weft }))]
+    }
+
+    fn lines(&self, simulation: &Simulation) -> String {
+        let mut t = String::new();
+        // writing to a String does not fail
+        for ((name, measured), [width, thickness, gap]) in
+            ["warp", "weft"].into_iter().zip(&self.measured).zip(self.settled.into_iter().flatten())
+        {
+            let _ = writeln!(
+                t,
+                "{name}       width / thickness / gap {width:.2} / {thickness:.2} / {gap:.2} mm before shear{measured}"
+            );
+        }
+        let forces = self.forces();
+        if !forces.is_empty() {
+            let _ = writeln!(t, "F_nor      {} N/mm (mean over ±{NEAR_DEG}°)", forces.join(", "));
+        }
+        let [weft, warp] = simulation.fibres();
+        let misses = [1, 0].map(|axis| self.missed(simulation, axis));
+        let missed = if misses.iter().any(Option::is_some) {
+            let [warp, weft] = misses.map(|miss| miss.map_or("–".into(), |miss| format!("{miss:.4}")));
+            format!("; off its aim by {warp} / {weft} (rms in shear)")
+        } else {
+            String::new()
+        };
+        let _ = writeln!(
+            t,
+            "fibres     warp / weft {:+.3} / {:+.3} % longer, membrane force {:.3} / {:.3} N/mm at the end{missed}",
+            100.0 * (warp.stretch - 1.0),
+            100.0 * (weft.stretch - 1.0),
+            warp.force,
+            weft.force
+        );
+        t
+    }
+}
+
+/// The components in the plane.
+fn in_plane(stress: [[f64; 3]; 3]) -> [[f64; 2]; 2] {
+    [0, 1].map(|i| [stress[i][0], stress[i][1]])
+}

@@ -1,0 +1,78 @@
+//! From a case file and the command line to a typed case whose every number has been checked.
+
+use crate::case::accuracy::{Accuracy, fill};
+use crate::case::overrides::Override;
+use crate::case::provenance::Provenance;
+use crate::case::schema::{self, Shape};
+use crate::case::validate::validate;
+use crate::case::{Case, check, defaults, parse};
+use crate::error::{Error, Result};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// A case that was read and checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Loaded {
+    /// The case, its fabric inline.
+    pub case: Case,
+    /// Everything that was not written: JSON path and value, by default or by the accuracy that was asked for.
+    pub defaults: Vec<(String, Value)>,
+    /// Where the parts were written; makes errors that name their file.
+    pub provenance: Provenance,
+}
+
+/// Reads a case file, loads the fabric file it names (relative to the case), applies `path=value` overrides in order,
+/// and checks everything that can be checked without a mesh.
+pub fn read(path: &Path, overrides: &[String]) -> Result<Loaded> {
+    let mut provenance = Provenance { case: path.into(), ..Provenance::default() };
+    let schema = schema::case();
+    let mut value = parse::file(path)?;
+    for text in overrides {
+        let set = Override::read(text)?;
+        if set.path == "fabric" {
+            provenance.fabric = None;
+        } else if set.path.starts_with("fabric.") {
+            inline_fabric(&mut value, &mut provenance)?;
+        }
+        set.apply(&mut value, &schema)?;
+        provenance.overrides.push(set);
+    }
+    inline_fabric(&mut value, &mut provenance)?;
+    if ["domain", "steps"].iter().all(|name| value.get(name).is_none()) && value.get("stitch").is_some() {
+        let message = "this is a fabric, not a case: give a case that names it in its field `fabric`";
+        return Err(provenance.error("", message));
+    }
+    validate(&value, Shape::new(&schema)).map_err(|fault| provenance.error(&fault.path, fault.message))?;
+    for place in ["", "/fabric"] {
+        if let Some(fields) = value.pointer_mut(place).and_then(Value::as_object_mut) {
+            fields.remove(schema::SCHEMA);
+        }
+    }
+    let written = value.clone();
+    if let Some(accuracy) = Accuracy::of(&value) {
+        fill(&mut value, &accuracy.fields());
+    }
+    let case: Case = serde_path_to_error::deserialize(&value)
+        .map_err(|e| provenance.error(&e.path().to_string(), e.inner().to_string()))?;
+    check::check(&case, &provenance)?;
+    super::of(&case.domain).check(&case, &provenance)?;
+    let full = serde_json::to_value(&case).map_err(|e| provenance.error("", e.to_string()))?;
+    let defaults = defaults::used(&written, &full);
+    Ok(Loaded { case, defaults, provenance })
+}
+
+/// Replaces the name of a fabric file by its content.
+fn inline_fabric(value: &mut Value, provenance: &mut Provenance) -> Result<()> {
+    let Some(Value::String(name)) = value.get("fabric") else { return Ok(()) };
+    let file: PathBuf = provenance.case.parent().unwrap_or(Path::new("")).join(name);
+    let fabric = parse::file(&file).map_err(|error| match error {
+        Error::File { path, message } => {
+            let message = format!("the fabric file {} cannot be read: {message}", path.display());
+            provenance.error("fabric", message)
+        }
+        other => other,
+    })?;
+    value["fabric"] = fabric;
+    provenance.fabric = Some(file);
+    Ok(())
+}

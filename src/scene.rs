@@ -1,0 +1,111 @@
+//! All that the solver needs, and nothing of how it was written: a user of the library may fill it in without a case.
+//!
+//! A test rig makes a scene from a case; the plan turns it into buffers and stages, and a simulation runs it.
+
+use crate::mesh::Mesh;
+use crate::mesh::vector::norm;
+use crate::settings::effects::Effects;
+use crate::settings::integration::Integration;
+use crate::settings::steps::Step;
+use std::collections::BTreeMap;
+
+/// A scene at rest. Units: mm, N, s, tonne, MPa.
+#[derive(Debug, Clone, Default)]
+pub struct Scene {
+    /// Bodies with their laws, and the friction between them.
+    pub mesh: Mesh,
+    /// Prescribed motion of nodes.
+    pub motions: Vec<Motion>,
+    /// Nodes of threads that are held at yarns; without effect where there is no contact.
+    pub ties: Vec<Tie>,
+    /// Load steps, in the order in which they are run.
+    pub steps: Vec<Step>,
+    pub effects: Effects,
+    pub integration: Integration,
+}
+
+/// Nodes that move together along a line: a clamp, or a condition of a case.
+#[derive(Debug, Clone)]
+pub struct Motion {
+    /// Name in the table of reactions.
+    pub name: String,
+    pub nodes: Vec<usize>,
+    /// Which components are prescribed.
+    pub components: [bool; 3],
+    /// Displacement at the end of a `move` step to 1, mm.
+    pub displacement: [f64; 3],
+    /// Number of load steps behind which the motion acts; with 0 it does from the start.
+    pub after: usize,
+}
+
+/// A node of a thread that stays where it is on a face of a yarn.
+#[derive(Debug, Clone, Copy)]
+pub struct Tie {
+    pub node: usize,
+    /// Corners of the face, and the weight of each.
+    pub corners: [usize; 4],
+    pub weights: [f64; 4],
+}
+
+/// What is prescribed at a node.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Prescribed {
+    /// Bit k: component k is prescribed.
+    pub mask: u32,
+    /// Displacement at full amplitude, mm.
+    pub displacement: [f64; 3],
+    /// See [`Motion::after`].
+    pub after: usize,
+}
+
+/// A motion that contradicts an earlier one at a node.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conflict {
+    /// Number of the later motion.
+    pub motion: usize,
+    pub message: String,
+}
+
+impl Scene {
+    /// Largest displacement that is prescribed, mm.
+    pub fn reach(&self) -> f64 {
+        self.motions.iter().map(|motion| norm(motion.displacement)).fold(0.0, f64::max)
+    }
+}
+
+/// What motions together prescribe, by node.
+///
+/// # Errors
+/// Two motions that differ at a node.
+pub fn prescribed(motions: &[Motion]) -> Result<BTreeMap<usize, Prescribed>, Conflict> {
+    let mut by_node = BTreeMap::<usize, Prescribed>::new();
+    for (number, motion) in motions.iter().enumerate() {
+        for &node in &motion.nodes {
+            let all = by_node.entry(node).or_insert(Prescribed { after: motion.after, ..Prescribed::default() });
+            let conflict = |message| Err(Conflict { motion: number, message });
+            if all.after != motion.after {
+                let message = format!(
+                    "acts behind load step {} at node {node}, where an earlier condition acts behind load step {}; \
+                         keep one of them",
+                    motion.after, all.after
+                );
+                return conflict(message);
+            }
+            for k in (0..3).filter(|k| motion.components[*k]) {
+                let displacement = motion.displacement[k];
+                if all.mask >> k & 1 == 1 && all.displacement[k] != displacement {
+                    let axis = ["x", "y", "z"][k];
+                    let message = format!(
+                        "prescribes {displacement} mm along {axis} at node {node}, which an earlier condition moves by \
+                             {} mm; keep one of them",
+                        all.displacement[k]
+                    );
+                    return conflict(message);
+                }
+                all.mask |= 1 << k;
+                all.displacement[k] = displacement;
+            }
+        }
+    }
+    Ok(by_node)
+}

@@ -1,0 +1,8 @@
+//! Shaders: the same numbers on a device as on the CPU, stage by stage and run by run.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod cell;
+mod shaders;
+mod stages;

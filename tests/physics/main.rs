@@ -1,0 +1,25 @@
+//! The solver against answers that are known: closed forms, balances, symmetries, differences of energies.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod arc_offset;
+mod beams;
+mod bounce;
+mod contact;
+mod crossings;
+mod drag;
+mod effects;
+mod elements;
+mod friction;
+mod geometry;
+mod gravity;
+mod guards;
+mod hourglass;
+mod materials;
+mod potential;
+mod segments;
+mod specimen;
+mod stretch;
+mod time_step;
+mod totals;

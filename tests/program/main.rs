@@ -1,0 +1,20 @@
+//! The program and its files: cases, folders, checkpoints, faults, studies, and the rules of the house.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod bad_cases;
+mod checkpoint;
+mod decks;
+mod faults;
+mod fuzz;
+mod grips;
+mod notes;
+mod report;
+mod reproducible;
+mod retries;
+mod run;
+mod schema;
+mod structure;
+mod study;
+mod study_effects;
