@@ -1,29 +1,39 @@
 //! The one error type. Every message names its culprit: the JSON path, the element or node, the value, and what to change.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 
+/// What lies behind an error, such as a failure of the file system.
+pub type Cause = Box<dyn std::error::Error + Send + Sync>;
+
 /// Everything that can go wrong between a case file and its results.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The case or fabric file does not say what `tricot` can run: `place` is a file and the JSON path inside it.
+    #[error("{place}: {message}")]
     Case { place: String, message: String },
     /// The parameters are valid one by one, but no fabric can be built from them.
+    #[error("{what}: {message}")]
     Geometry { what: String, message: String },
     /// A file or folder could not be read or written.
-    File { path: PathBuf, message: String },
+    #[error("{}: {source}", path.display())]
+    File { path: PathBuf, source: Cause },
     /// The run was stopped by a guard; the message holds the step, the element or node, the value and advice.
-    Guard(Guard),
+    #[error(transparent)]
+    Guard(#[from] Guard),
     /// A request that this build or machine cannot serve.
+    #[error("{0}")]
     Unsupported(String),
     /// A shader that cannot be put together or compiled: file, line and what is wrong.
+    #[error("{0}")]
     Shader(String),
     /// The GPU failed during a run: lost, out of memory, or a fault of its driver.
+    #[error("{0}")]
     Device(String),
 }
 
 /// Why a guard stopped a run. Results up to the last output before it stay on disk.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("stopped by the {cause} guard at step {step} (t = {time:.6e} s): {culprit}; {advice}")]
 pub struct Guard {
     /// Short name, such as `non-finite`, `inversion`, `energy`, `contact overflow`.
     pub cause: String,
@@ -52,8 +62,8 @@ impl Error {
     }
 
     /// An error of the file system at `path`.
-    pub fn file(path: impl AsRef<Path>, source: impl fmt::Display) -> Self {
-        Error::File { path: path.as_ref().to_path_buf(), message: source.to_string() }
+    pub fn file(path: impl AsRef<Path>, source: impl Into<Cause>) -> Self {
+        Error::File { path: path.as_ref().to_path_buf(), source: source.into() }
     }
 
     /// Exit code of the program: 2 bad input, 3 stopped by a guard, 4 files, 5 unsupported, 6 a GPU that
@@ -68,24 +78,3 @@ impl Error {
         }
     }
 }
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Error::Case { place, message } => write!(f, "{place}: {message}"),
-            Error::Geometry { what, message } => write!(f, "{what}: {message}"),
-            Error::File { path, message } => write!(f, "{}: {message}", path.display()),
-            Error::Guard(guard) => write!(f, "{guard}"),
-            Error::Unsupported(message) | Error::Device(message) | Error::Shader(message) => f.write_str(message),
-        }
-    }
-}
-
-impl fmt::Display for Guard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Guard { cause, step, time, culprit, advice } = self;
-        write!(f, "stopped by the {cause} guard at step {step} (t = {time:.6e} s): {culprit}; {advice}")
-    }
-}
-
-impl std::error::Error for Error {}

@@ -62,6 +62,28 @@
 //! ```
 //! Moreover, the backend knows only `error` and `kernel`, and `output` does not know `measure`.
 //!
+//! # From Rust
+//! `examples/cell.rs` shears a cell and prints its force; a [`scene::Scene`] may also be made by hand:
+//! ```
+//! use tricot::prelude::*;
+//!
+//! // a thread of 10 mm that swings once it is let go: 11 nodes, 100 N, held at both ends
+//! let case = read_value(serde_json::json!({
+//!     "title": "a string",
+//!     "domain": { "mesh": { "threads": [{
+//!         "name": "string", "nodes": (0..=10).map(|x| [f64::from(x), 0.0, 0.0]).collect::<Vec<_>>(),
+//!         "radius_mm": 0.1, "axial_n": 100, "linear_density_tex": 10
+//!     }], "conditions": [{ "within": [[0, 0, 0], [0, 0, 0]] }, { "within": [[10, 0, 0], [10, 0, 0]] }] } },
+//!     "effects": { "contact": null, "damping": null, "gravity_mm_s2": [0, 0, -9810] },
+//!     "steps": [{ "hold": { "time_s": 1e-4 } }]
+//! }))?;
+//! let mut string = Simulation::new(scene(&case)?, BackendConfig { precision: Precision::F64, ..BackendConfig::default() })?;
+//! string.advance(1e-4, |_| false)?;
+//! let fallen = string.fluctuations()[5][2];
+//! assert!((fallen + 0.5 * 9810.0 * 1e-8).abs() < 1e-2 * fallen.abs());
+//! # Ok::<(), tricot::error::Error>(())
+//! ```
+//!
 //! # Where to add
 //! - **A material**: a file in `materials` with `impl Material` and its twin under `shaders`, an arm in `materials::Law` and in
 //!   [`settings::material::Material`]. The tests of `materials` compare its stress with differences of its energy.
@@ -89,9 +111,30 @@ pub mod mesh;
 pub mod output;
 pub mod plan;
 pub mod rigs;
+#[cfg(feature = "cli")]
 pub mod run;
 pub mod scene;
 pub mod schedule;
 pub mod settings;
 pub mod simulate;
+#[cfg(feature = "cli")]
 pub mod study;
+
+/// What a user of the library holds most.
+pub mod prelude {
+    pub use crate::case::Case;
+    pub use crate::case::fabric::Fabric;
+    pub use crate::error::{Error, Result};
+    pub use crate::measure::shear::CellCurve;
+    pub use crate::measure::{stitches, yarns};
+    pub use crate::mesh::frame::Frame;
+    pub use crate::mesh::{Block, Mesh, Thread};
+    pub use crate::rigs::read::{read, read_value};
+    pub use crate::rigs::scene;
+    pub use crate::scene::{Motion, Scene, Tie};
+    pub use crate::settings::effects::Effects;
+    pub use crate::settings::integration::{Integration, Precision};
+    pub use crate::settings::material::Material;
+    pub use crate::settings::steps::Step;
+    pub use crate::simulate::{BackendConfig, Energies, Health, Simulation};
+}

@@ -1,6 +1,11 @@
 //! Backends run stages on buffers. They know no physics.
 
+pub mod adapter;
 pub mod cpu;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+#[cfg(not(feature = "gpu"))]
+#[path = "no_gpu.rs"]
 pub mod gpu;
 
 use crate::kernel::buffer::Buffer;

@@ -120,6 +120,7 @@ impl Text {
     ///
     /// # Errors
     /// What is wrong, by file and line of the source.
+    #[cfg(feature = "gpu")]
     pub fn module(&self) -> Result<(naga::Module, naga::valid::ModuleInfo)> {
         let module = naga::front::wgsl::parse_str(&self.text).map_err(|error| {
             let line = error.location(&self.text).map(|at| at.line_number as usize);
@@ -140,6 +141,7 @@ impl Text {
         Ok((module, info))
     }
 
+    #[cfg(feature = "gpu")]
     fn error(&self, what: &str, line: Option<usize>) -> Error {
         match line.and_then(|line| self.lines.get(line.wrapping_sub(1))) {
             Some((file, number)) => Error::Shader(format!("shaders/{file}.wgsl:{number}: {what}")),
@@ -201,7 +203,7 @@ impl Composer {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "gpu"))]
 mod tests {
     use super::*;
     use crate::kernel::exact::Exact;

@@ -24,6 +24,7 @@
 
 use crate::error::{Error, Result};
 use crate::kernel::record::{Record, Recorded};
+use crate::mesh::Mesh;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2};
 
 /// Trellis shear F̄(γ) = [[cos γ/2, sin γ/2], [sin γ/2, cos γ/2]]: both fibre directions keep their length.
@@ -54,6 +55,45 @@ pub fn normalised_force(stress: [[f64; 2]; 2], angle: f64, stretch: [f64; 2], ar
     let rate = gradient_rate(angle, stretch);
     let power: f64 = stress.iter().flatten().zip(rate.iter().flatten()).map(|(p, f)| p * f).sum();
     power / (area * angle.cos())
+}
+
+/// F_nor of a periodic cell from row to row, N/mm: since ∫ A₀ F_nor cos γ dγ is the external work, the work between two angles
+/// gives the mean force.
+#[derive(Debug, Clone, Copy)]
+pub struct CellCurve {
+    area: f64,
+    /// Shear angle (rad) and external work (mJ) at the last row.
+    last: [f64; 2],
+}
+
+impl CellCurve {
+    /// Of a cell that has not been sheared.
+    pub fn new(mesh: &Mesh) -> Self {
+        Self { area: mesh.period.map_or(f64::NAN, |[x, y]| x * y), last: [0.0; 2] }
+    }
+
+    /// Goes on from an angle, rad, and the external work up to there, mJ.
+    pub fn start(&mut self, angle: f64, work: f64) {
+        self.last = [angle, work];
+    }
+
+    /// Angle at the last row, rad.
+    pub fn angle(&self) -> f64 {
+        self.last[0]
+    }
+
+    /// Mean force since the last row; `None` where the angle is the same.
+    pub fn push(&mut self, angle: f64, work: f64) -> Option<f64> {
+        let [before, done] = std::mem::replace(&mut self.last, [angle, work]);
+        let turned = libm::sin(angle) - libm::sin(before);
+        (turned.abs() > 1e-9).then(|| (work - done) / (self.area * turned))
+    }
+}
+
+impl Recorded for CellCurve {
+    fn record(&mut self, record: &mut Record) {
+        self.last.record(record);
+    }
 }
 
 /// Membrane forces along the fibre directions x and y, N per mm of reference width across them: the components of V P̄/A₀ that do

@@ -38,11 +38,24 @@ pub fn read(path: &Path, overrides: &[String]) -> Result<Loaded> {
         provenance.overrides.push(set);
     }
     inline_fabric(&mut value, &mut provenance)?;
+    checked(value, provenance)
+}
+
+/// A case from a JSON value that holds its fabric, checked as if it were a file.
+///
+/// # Errors
+/// The first fault, by its JSON path.
+pub fn read_value(value: Value) -> Result<Case> {
+    checked(value, Provenance { case: "case".into(), ..Provenance::default() }).map(|loaded| loaded.case)
+}
+
+/// The case in a value whose overrides have been applied.
+fn checked(mut value: Value, provenance: Provenance) -> Result<Loaded> {
     if ["domain", "steps"].iter().all(|name| value.get(name).is_none()) && value.get("stitch").is_some() {
         let message = "this is a fabric, not a case: give a case that names it in its field `fabric`";
         return Err(provenance.error("", message));
     }
-    validate(&value, Shape::new(&schema)).map_err(|fault| provenance.error(&fault.path, fault.message))?;
+    validate(&value, Shape::new(&schema::case())).map_err(|fault| provenance.error(&fault.path, fault.message))?;
     for place in ["", "/fabric"] {
         if let Some(fields) = value.pointer_mut(place).and_then(Value::as_object_mut) {
             fields.remove(schema::SCHEMA);
@@ -66,8 +79,8 @@ fn inline_fabric(value: &mut Value, provenance: &mut Provenance) -> Result<()> {
     let Some(Value::String(name)) = value.get("fabric") else { return Ok(()) };
     let file: PathBuf = provenance.case.parent().unwrap_or(Path::new("")).join(name);
     let fabric = parse::file(&file).map_err(|error| match error {
-        Error::File { path, message } => {
-            let message = format!("the fabric file {} cannot be read: {message}", path.display());
+        Error::File { path, source } => {
+            let message = format!("the fabric file {} cannot be read: {source}", path.display());
             provenance.error("fabric", message)
         }
         other => other,

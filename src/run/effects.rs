@@ -104,7 +104,13 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
     add(
         active.friction,
         "friction",
-        &|| format!("{}; the coefficient is {}", written("effects.contact.friction"), simulation.mesh().friction),
+        &|| {
+            format!(
+                "{} and a coefficient of friction of {}",
+                written("effects.contact.friction"),
+                simulation.mesh().friction
+            )
+        },
         &[],
         Some(|l| contact(l, |c| c.friction = false)),
     );

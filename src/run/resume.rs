@@ -1,6 +1,7 @@
 //! Checkpoints of a run: when they are written, and how a run goes on from one.
 
-use super::{CASE, FINISHED, Options, Place, Run};
+use super::session::{Place, Run};
+use super::{CASE, FINISHED, Options};
 use crate::case::{Case, parse};
 use crate::error::{Error, Guard, Result};
 use crate::kernel::record::{Record, Recorded};

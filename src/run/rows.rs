@@ -1,6 +1,6 @@
 //! The rows of a run: at every moment that is written, one row in every table.
 
-use super::Run;
+use super::session::Run;
 use crate::error::Result;
 use crate::measure::stitches;
 use crate::measure::yarns::{self, Yarn};

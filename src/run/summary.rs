@@ -1,7 +1,7 @@
 //! What a run says at its end: `summary.json` for programs, a dozen lines for a person.
 
-use super::Run;
 use super::notes::notes;
+use super::session::Run;
 use crate::error::Result;
 use crate::measure::stitches;
 use crate::output::{file, lock};

@@ -2,7 +2,7 @@
 //!
 //! Contact adds the mass that a step of its length needs, and the measured limit is the longest step that lasts with its
 //! own mass. The estimate counts the mass of the step in use. So that both speak of one scene, steps here may grow to
-//! [`LIFTED`] times the longest that the case allows, in effect to what the estimate says.
+//! `LIFTED` times the longest that the case allows, in effect to what the estimate says.
 
 use crate::error::{Error, Result};
 use crate::rigs::read::Loaded;

@@ -1,5 +1,5 @@
 //! Every case in `cases/bad` gets exactly the message beside it, and no input makes the reader panic.
-//! `TRICOT_WRITE_MESSAGES=1 cargo test --release --test bad_cases` writes the messages anew, to be read before they are committed.
+//! `TRICOT_WRITE_MESSAGES=1 cargo test --release --test program bad_cases` writes the messages anew, to be read before they are committed.
 
 use proptest::prelude::*;
 use serde_json::{Value, json};

@@ -88,7 +88,7 @@ impl Mutator {
         bytes
     }
 
-    /// Bytes of JSON with some numbers changed to others: most of them still config a case.
+    /// Bytes of JSON with some numbers changed to others: most of them still make a case.
     fn renumber(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut bytes = bytes.to_vec();
         for _ in 0..1 + self.below(3) {

@@ -57,11 +57,13 @@ fn imports_point_one_way() {
     let order = order();
     let declared: BTreeSet<String> = text(Path::new("src/lib.rs"))
         .lines()
-        .filter_map(|l| Some(l.strip_prefix("pub mod ")?.trim_end_matches(';').to_string()))
+        .filter_map(|l| Some(l.strip_prefix("pub mod ")?.strip_suffix(';')?.to_string()))
         .collect();
     assert_eq!(declared, order.iter().cloned().collect(), "lib.rs lists its modules once each in the order");
     let rank = |module: &str| order.iter().position(|m| m == module).unwrap_or_else(|| panic!("no module {module}"));
-    for path in sources("src").iter().filter(|p| !p.ends_with("lib.rs") && !p.ends_with("main.rs")) {
+    for path in
+        sources("src").iter().filter(|p| !p.ends_with("lib.rs") && !p.ends_with("main.rs") && !p.starts_with("src/cli"))
+    {
         let (own, code, shown) = (module(path), code(path), path.display());
         assert!(!code.contains("crate::{"), "{shown}: one path a `use crate::`");
         let top = path.components().count() == 2 || path.ends_with("mod.rs");

@@ -140,7 +140,7 @@ fn a_study_says_what_its_runs_say_and_runs_none_of_them_twice() {
     // several times the work, whatever the machine does meanwhile
     assert!(times[row("reference")] > 2.0, "{times:?}");
 
-    // errors are differences from the reference, and none is claimed that places of nodes may config
+    // errors are differences from the reference, and none is claimed that places of nodes may make
     let json: Value = serde_json::from_slice(&fs::read(dir.join("accuracy.json")).unwrap()).unwrap();
     let of = |name: &str| Results::read(&dir.join("points").join(name)).unwrap();
     let by = |what: &str| json[what]["F_nor"].as_f64().unwrap();
@@ -158,7 +158,7 @@ fn a_study_says_what_its_runs_say_and_runs_none_of_them_twice() {
         assert_eq!((claimed, cell.starts_with('<')), (found.max(places), found < places), "{name}");
     }
 
-    // the flags of a point are those that config it, from the tightened state where only the loading differs
+    // the flags of a point are those that make it, from the tightened state where only the loading differs
     let flags = table.texts("flags");
     assert_eq!(flags[row("beams × 2")], "--set resolution.beams_per_lap=64");
     let loading = flags[row("loading × 0.5")];

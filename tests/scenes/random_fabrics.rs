@@ -25,7 +25,7 @@ use tricot::simulate::{BackendConfig, Simulation};
 
 /// Steps that a case must run.
 const STEPS: u64 = 2000;
-/// Numbers that config a case, each from −1 to 1; with zeros it is the shipped fabric, coarsely meshed.
+/// Numbers that make a case, each from −1 to 1; with zeros it is the shipped fabric, coarsely meshed.
 const NUMBERS: usize = 39;
 
 /// Shrunk failures, by what was wrong with them.

@@ -1,6 +1,9 @@
 //! Adapters, the device that a run works on, its limits and its faults.
 
+use super::Gpu;
 use super::pipeline::Pipeline;
+use crate::backend::Backend;
+use crate::backend::adapter::Adapter;
 use crate::error::{Error, Result};
 use crate::kernel::buffer::Description;
 use crate::kernel::shader::Text;
@@ -12,29 +15,6 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// Storage buffers that the widest stage binds.
 const STORAGE_BUFFERS: u32 = 16;
 
-/// An adapter, as `tricot devices` lists it.
-#[derive(Debug, Clone)]
-pub struct Listed {
-    pub name: String,
-    /// Graphics interface: Vulkan, Metal or Dx12.
-    pub interface: String,
-    pub driver: String,
-    /// Discrete GPU, integrated GPU, virtual GPU, or software.
-    pub kind: &'static str,
-    /// A GPU with memory of its own.
-    pub is_discrete: bool,
-    /// Largest buffer that a stage can bind, bytes.
-    pub binding_bytes: u64,
-    /// Largest buffer, bytes.
-    pub buffer_bytes: u64,
-    /// Storage buffers that a stage can bind.
-    pub storage_buffers: u32,
-    /// Memory that a workgroup shares, bytes.
-    pub workgroup_bytes: u32,
-    /// Whether stages can be timed on the device.
-    pub has_timestamps: bool,
-}
-
 /// Kind of an adapter that computes on the CPU.
 const SOFTWARE: &str = "software";
 
@@ -42,7 +22,7 @@ const SOFTWARE: &str = "software";
 pub struct Device {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
-    listed: Listed,
+    listed: Adapter,
     limits: wgpu::Limits,
     /// Layout of the row of schedule data, which all stages share.
     pub(super) row_layout: wgpu::BindGroupLayout,
@@ -83,9 +63,9 @@ fn adapters() -> Vec<wgpu::Adapter> {
     all
 }
 
-fn list(adapter: &wgpu::Adapter) -> Listed {
+fn list(adapter: &wgpu::Adapter) -> Adapter {
     let (info, limits) = (adapter.get_info(), adapter.limits());
-    Listed {
+    Adapter {
         name: info.name,
         interface: info.backend.to_string(),
         driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
@@ -106,7 +86,7 @@ fn list(adapter: &wgpu::Adapter) -> Listed {
 }
 
 /// All adapters, the one that a run would take first.
-pub fn devices() -> Vec<Listed> {
+pub fn devices() -> Vec<Adapter> {
     adapters().iter().map(list).collect()
 }
 
@@ -120,6 +100,14 @@ fn line(message: &str) -> String {
 }
 
 impl Device {
+    /// The backend that runs scenes on it.
+    ///
+    /// # Errors
+    /// A scene that the device cannot hold or compute.
+    pub fn backend(self: Arc<Self>, descriptions: &[Description]) -> Result<Box<dyn Backend>> {
+        Ok(Box::new(Gpu::new(self, descriptions)?))
+    }
+
     /// Whether it computes on the CPU.
     pub fn is_software(&self) -> bool {
         self.listed.kind == SOFTWARE
@@ -194,7 +182,7 @@ impl Device {
     }
 
     /// What the adapter is.
-    pub fn listed(&self) -> &Listed {
+    pub fn listed(&self) -> &Adapter {
         &self.listed
     }
 

@@ -10,7 +10,7 @@ mod device;
 mod pipeline;
 mod rates;
 
-pub use device::{Device, Listed, devices};
+pub use device::{Device, devices};
 pub use rates::Rates;
 
 use super::Backend;

@@ -3,7 +3,8 @@
 use crate::case::fabric::Fabric;
 use crate::error::Result;
 use crate::kernel::record::{Record, Recorded};
-use crate::measure::{shear, yarns};
+use crate::measure::shear::{self, CellCurve};
+use crate::measure::yarns;
 use crate::mesh::Ply;
 use crate::mesh::frame::Frame;
 use crate::output::table::{STRESS, Table};
@@ -27,14 +28,13 @@ const NEAR_DEG: f64 = 1.0;
 pub(super) struct Sheared {
     /// Reference area, mm².
     area: f64,
+    force: CellCurve,
     stress: Table,
     crossings: Option<Crossed>,
     /// Sizes of warp and weft in the real fabric, for the last lines.
     measured: [String; 2],
     /// Shear angle, degrees, and F_nor, N/mm, at the rows of shear.
     curve: Vec<(f64, f64)>,
-    /// Shear angle (rad) and external work (mJ) at the last row.
-    last: [f64; 2],
     /// Squares of the errors of the membrane forces along x and y, (N/mm)², summed over the rows of shear, and their number.
     missed: [f64; 3],
     /// Mean width, thickness and gap of warp and weft before shear, mm.
@@ -50,26 +50,21 @@ impl Sheared {
         };
         Ok(Self {
             area: mesh.period.map_or(f64::NAN, |[x, y]| x * y),
+            force: CellCurve::new(mesh),
             stress: tables.open("stress.csv", STRESS)?,
             crossings: Crossed::of(mesh, DIAGONAL, None, tables)?,
             measured: [&fabric.warp, &fabric.weft].map(measured),
             curve: Vec::new(),
-            last: [0.0; 2],
             missed: [0.0; 3],
             settled: None,
         })
     }
 
-    /// F_nor from V P̄, N/mm.
+    /// F_nor: the mean over the row, or from V P̄ while the angle does not change, N/mm.
     fn force(&mut self, simulation: &Simulation, stress: [[f64; 3]; 3]) -> f64 {
-        let (angle, work) = (simulation.load().angle, simulation.energies().external);
-        let [before, done] = std::mem::replace(&mut self.last, [angle, work]);
-        let turned = libm::sin(angle) - libm::sin(before);
-        if turned.abs() > 1e-9 {
-            // the mean over the row: ∫ A₀ F_nor cos γ dγ is the external work
-            return (work - done) / (self.area * turned);
-        }
-        shear::normalised_force(in_plane(stress), angle, simulation.stretch(), self.area)
+        let angle = simulation.load().angle;
+        let still = || shear::normalised_force(in_plane(stress), angle, simulation.stretch(), self.area);
+        self.force.push(angle, simulation.energies().external).unwrap_or_else(still)
     }
 
     /// Sizes of yarns before shear, for the last lines.
@@ -110,7 +105,7 @@ impl Sheared {
 
 impl Observer for Sheared {
     fn start(&mut self, simulation: &Simulation, behind: &[Step]) -> Result<()> {
-        self.last = [simulation.load().angle, simulation.energies().external];
+        self.force.start(simulation.load().angle, simulation.energies().external);
         if behind.iter().any(|step| matches!(step, Step::Shear { .. })) {
             return Ok(());
         }
@@ -122,7 +117,7 @@ impl Observer for Sheared {
         let degrees = simulation.load().angle.to_degrees();
         let stress = simulation.take_stress().unwrap_or_default();
         // a mean over the row belongs to its middle
-        let middle = 0.5 * (self.last[0] + simulation.load().angle);
+        let middle = 0.5 * (self.force.angle() + simulation.load().angle);
         let normalised = self.force(simulation, stress);
         if seen.phase == "shear" {
             self.curve.push((degrees, normalised));
@@ -160,12 +155,12 @@ impl Observer for Sheared {
     }
 
     fn record(&mut self, record: &mut Record) {
-        let Self { crossings, curve, last, missed, settled, area: _, stress: _, measured: _ } = self;
+        let Self { crossings, force, curve, missed, settled, area: _, stress: _, measured: _ } = self;
         if let Some(crossed) = crossings {
             crossed.maps.record(record);
         }
         curve.record(record);
-        last.record(record);
+        force.record(record);
         missed.record(record);
         settled.record(record);
     }

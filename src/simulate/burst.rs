@@ -1,0 +1,93 @@
+//! A burst: some steps in one go, then a look at the distance travelled, and a contact search if the skin is used up.
+
+use super::look::Looked;
+use super::{AFFINE_REACH, BURST, CALM, FARTHEST, SPEED_MARGIN, Simulation, WINDOW, largest};
+use crate::contact::skin::{SKIN_APART, SKIN_USED};
+use crate::contact::status;
+use crate::error::Result;
+use crate::kernel::buffer::Initial;
+use crate::kernel::row::Row;
+
+impl Simulation {
+    /// Some steps, then a search if the skin is used up. If the last step is looked at, returns its totals.
+    pub(super) fn burst(&mut self, steps: u64, looks: bool) -> Result<Option<Looked>> {
+        self.hold();
+        let mut rows = Vec::with_capacity(steps as usize);
+        let mut time = self.time;
+        let looked_at = self.diagnosed == self.step;
+        for step in 0..steps {
+            let row = self.row(time, self.dt, self.dt_before);
+            // thermal work by the trapezoidal rule; across a look, the tension after it stands for both
+            let (back, ahead) = (row.thermal_increment, self.schedule.load(time + self.dt).thermal - row.thermal);
+            let first = if step == 0 && looked_at { back } else { 0.5 * back };
+            let second = if step + 1 == steps && looks { 0.0 } else { 0.5 * ahead };
+            let affine = largest(row.rate);
+            let approach = 2.0 * SPEED_MARGIN * self.speed + 2.0 * affine * AFFINE_REACH;
+            rows.push(Row { approach, thermal_increment: first + second, ..row });
+            self.dt_before = self.dt;
+            time += self.dt;
+        }
+        let last = rows.len() - usize::from(looks);
+        self.backend.run(&self.model.plan.step, &rows[..last]);
+        self.time = time;
+        self.step += steps;
+        let looked = if looks { Some(self.looked_at_step(rows[last])?) } else { None };
+        self.backend.run(&self.model.plan.watch, &rows[..1]);
+        let status = self.backend.uints(self.model.buffers.status);
+        self.alive()?;
+        self.check_flags(&status)?;
+        let before = std::mem::replace(&mut self.speed, f64::from(f32::from_bits(status[status::SPEED])));
+        let travel = f64::from(f32::from_bits(status[status::TRAVEL]));
+        let load = self.load();
+        let (stretch, then) = (self.stretch(), self.stretch_at_search);
+        let strained = [0, 1].map(|k| (stretch[k] - then[k]).abs()).into_iter().fold(0.0, f64::max);
+        let affine = ((load.angle - self.gradient_at_search.angle).abs() + strained) * AFFINE_REACH;
+        let contact = self.scene.effects.contact.as_ref().filter(|_| self.model.active.searches());
+        let skin = contact.map_or(f64::INFINITY, |c| c.skin_mm);
+        let mut left = SKIN_USED * skin - travel - affine;
+        let found = self.model.buffers.found.into_iter().flatten();
+        let all: usize = found.map(|found| self.model.plan.buffers[found.0].len).sum();
+        let pays = self.searched >= all as u64;
+        if affine > SKIN_APART * skin || load.radius > self.gradient_at_search.radius || left < 0.0 && pays {
+            self.search_all()?;
+            left = SKIN_USED * skin;
+        } else if left < 0.0 {
+            self.search()?;
+            left = SKIN_USED * skin - affine;
+        }
+        // a float that is too large for an integer becomes the largest one
+        let sure = (left.min(FARTHEST) / (SPEED_MARGIN * self.speed * self.dt)) as u64;
+        let longer = if self.speed > CALM * before { BURST } else { 2 * self.burst };
+        self.burst = longer.min(sure).clamp(BURST, WINDOW);
+        Ok(looked)
+    }
+
+    /// A step with its totals in the middle and after it.
+    pub(super) fn looked_at_step(&mut self, row: Row<f64>) -> Result<Looked> {
+        self.backend.run(&self.model.plan.step[..self.model.forces], &[row]);
+        let middle = self.diagnose(row)?;
+        self.backend.run(&self.model.plan.step[self.model.forces..], &[row]);
+        self.backend.run(&self.model.collect_motion, &[row]);
+        let after = self.backend.scalars(self.model.totals.buffer);
+        self.alive()?;
+        Ok(Looked { middle, after })
+    }
+
+    /// Lets prescribed motion act from its time on, by the masks of its nodes.
+    pub(super) fn hold(&mut self) {
+        let passed = self.schedule.phases().iter().take_while(|phase| self.time >= phase.end * (1.0 - 1e-12)).count();
+        let acting = if self.model.acts_after.iter().any(|after| *after > passed) { passed } else { usize::MAX };
+        if acting == self.acting {
+            return;
+        }
+        self.acting = acting;
+        let Some(buffer) = self.model.buffers.prescribed else { return };
+        if let Initial::Uint(all) = &self.model.plan.buffers[buffer.0].initial {
+            let mut masked = all.clone();
+            for (condition, after) in masked.chunks_exact_mut(2).zip(&self.model.acts_after) {
+                condition[1] = if *after <= passed { condition[1] } else { 0 };
+            }
+            self.backend.set_bytes(buffer, bytemuck::cast_slice(&masked));
+        }
+    }
+}

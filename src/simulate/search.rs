@@ -1,0 +1,149 @@
+//! The contact search as the host sees it: everything, or what has moved, with tables that grow when they overflow.
+
+use super::Simulation;
+use crate::contact::penalty::GAPS;
+use crate::contact::threads::MOST_PAIRS;
+use crate::contact::{found, status};
+use crate::error::Result;
+use crate::kernel::buffer::Buffer;
+use crate::kernel::position::QUANTUM;
+use crate::plan::{self, Capacity};
+
+impl Simulation {
+    /// Searches contact everywhere, and notes where nodes are: until the next time, their motion is counted from here.
+    pub(super) fn search_all(&mut self) -> Result<()> {
+        let b = &self.model.buffers;
+        if let Some(before) = b.before {
+            let now = self.backend.ints(b.quanta).into_iter().zip(self.backend.scalars(b.remainder));
+            let now: Vec<i32> =
+                now.map(|(quanta, rest)| quanta.wrapping_add((rest / QUANTUM).round() as i32)).collect();
+            self.backend.set_bytes(before, bytemuck::cast_slice(&now));
+        }
+        for found in b.found.into_iter().flatten() {
+            let count = self.model.plan.buffers[found.0].len;
+            self.backend.set_bytes(found, bytemuck::cast_slice(&vec![found::NEVER; count]));
+        }
+        self.search()?;
+        self.searched = 0;
+        self.gradient_at_search = self.load();
+        self.stretch_at_search = self.stretch();
+        Ok(())
+    }
+
+    /// Runs the contact search where bodies have moved relative to each other, with larger tables if they overflow: what does not
+    /// fit is left as it was, so that a search that overflows leaves nothing that the next one does not find again.
+    pub(super) fn search(&mut self) -> Result<()> {
+        if self.model.plan.search.is_empty() {
+            return Ok(());
+        }
+        let mut crowded = None;
+        for _ in 0..8 {
+            let row = self.row(self.time, self.dt, self.dt_before);
+            self.backend.run(&self.model.plan.search, &[row]);
+            let status = self.backend.uints(self.model.buffers.status);
+            self.alive()?;
+            let full = status[status::FLAGS] & (status::CELL_FULL | status::SLOTS_FULL);
+            self.clear_travel(&status);
+            if full == 0 {
+                self.check_flags(&status)?;
+                self.searches += 1;
+                self.searched += u64::from(status[status::SEARCHED]);
+                return Ok(());
+            }
+            crowded = self.most_crowded();
+            let mut capacity = self.capacity;
+            if full & status::CELL_FULL != 0 {
+                capacity.cell *= 2;
+            }
+            if full & status::SLOTS_FULL != 0 {
+                capacity.faces = (capacity.faces * 2).min(Capacity::MOST_FACES);
+                capacity.slots = (capacity.slots * 2).min(Capacity::MOST_SLOTS);
+                capacity.beam_slots = (capacity.beam_slots * 2).min(MOST_PAIRS);
+            }
+            self.grow(capacity)?;
+        }
+        Err(self.guard(
+            "contact overflow",
+            format!(
+                "more candidates than {:?}{}",
+                self.capacity,
+                crowded.map_or_else(String::new, |place| format!("; most crowded: {place}"))
+            ),
+            "bodies have collapsed onto each other: lower the load or its speed",
+        ))
+    }
+
+    /// Moves the state into a plan with larger contact tables.
+    pub(super) fn grow(&mut self, capacity: Capacity) -> Result<()> {
+        let model = plan::build(&self.scene, capacity)?;
+        let mut backend = self.config.backend(&model)?;
+        // found again
+        let b = &self.model.buffers;
+        let lists: Vec<_> = b.faces.iter().flatten().map(|faces| Some(faces.near)).collect();
+        for (old, description) in self.model.plan.buffers.iter().enumerate() {
+            let new = model.plan.buffers.iter().position(|d| d.name == description.name);
+            let is_listed = b.found.contains(&Some(Buffer(old))) || lists.contains(&Some(Buffer(old)));
+            let Some(new) =
+                new.filter(|_| !is_listed && !matches!(description.name, "items of cells" | "cells" | "status"))
+            else {
+                continue;
+            };
+            // of gaps, those of faces are found again
+            let is_gaps = b.faces.iter().flatten().any(|faces| faces.gaps == Buffer(old));
+            let bytes = self.backend.bytes(Buffer(old));
+            let bytes = if is_gaps || model.plan.buffers[new].len != description.len {
+                widen(
+                    &bytes,
+                    description.len,
+                    &backend.bytes(Buffer(new)),
+                    model.plan.buffers[new].len,
+                    self.items_of(old),
+                    if is_gaps { GAPS } else { usize::MAX },
+                )
+            } else {
+                bytes
+            };
+            backend.set_bytes(Buffer(new), &bytes);
+        }
+        self.alive()?;
+        self.spent_before = self.timings();
+        self.model = model;
+        self.backend = backend;
+        self.capacity = capacity;
+        Ok(())
+    }
+
+    /// Rows of a table that grows with its slots.
+    pub(super) fn items_of(&self, buffer: usize) -> usize {
+        let b = &self.model.buffers;
+        let kind =
+            b.faces.iter().position(|f| f.is_some_and(|f| [f.keys, f.touches, f.gaps].contains(&Buffer(buffer))));
+        kind.map_or(self.scene.mesh.beams(), |kind| self.model.points[kind].len())
+    }
+
+    pub(super) fn clear_travel(&mut self, status: &[u32]) {
+        let mut bytes = bytemuck::cast_slice::<u32, u8>(status).to_vec();
+        for place in [status::FLAGS, status::TRAVEL, status::SPEED, status::SEARCHED] {
+            bytes[4 * place..][..4].fill(0);
+        }
+        // flags that stop the run stay
+        let stay = status[status::FLAGS] & !(status::CELL_FULL | status::SLOTS_FULL);
+        bytes[4 * status::FLAGS..][..4].copy_from_slice(&stay.to_ne_bytes());
+        self.backend.set_bytes(self.model.buffers.status, &bytes);
+    }
+}
+
+/// Slots of an old table in the first places of wider rows of a new one: lengths in numbers, how many rows, and the most numbers that
+/// are taken from each.
+fn widen(old: &[u8], old_len: usize, fresh: &[u8], new_len: usize, items: usize, most: usize) -> Vec<u8> {
+    let mut new = fresh.to_vec();
+    if items == 0 || !old_len.is_multiple_of(items) || !new_len.is_multiple_of(items) {
+        return new;
+    }
+    let (old_row, new_row) = (old.len() / items, new.len() / items);
+    let taken = old_row.min(most.saturating_mul(old.len() / old_len.max(1)));
+    for item in 0..items {
+        new[item * new_row..][..taken].copy_from_slice(&old[item * old_row..][..taken]);
+    }
+    new
+}
