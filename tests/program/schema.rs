@@ -114,6 +114,8 @@ fn shipped_cases_and_fabrics_are_valid() {
     for path in json_files("cases/fabrics") {
         let value: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
         validate(&value, Shape::new(&schema::fabric())).unwrap();
+        let set = format!("fabric=fabrics/{}", path.file_name().unwrap().to_str().unwrap());
+        read(Path::new("cases/unit_cell_shear.json"), &[set]).unwrap_or_else(|e| panic!("{e}"));
     }
 }
 

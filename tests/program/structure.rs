@@ -119,28 +119,6 @@ fn shaders_are_twins() {
     }
 }
 
-fn json_files(folder: &str) -> Vec<PathBuf> {
-    let files = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
-    files.filter(|p| p.extension().is_some_and(|e| e == "json")).collect()
-}
-
-#[test]
-fn every_case_and_fabric_is_valid() {
-    let cases = json_files("cases");
-    assert!(!cases.is_empty());
-    for case in cases {
-        if let Err(error) = read(&case, &[]) {
-            panic!("{error}");
-        }
-    }
-    for fabric in json_files("cases/fabrics") {
-        let set = format!("fabric=fabrics/{}", fabric.file_name().unwrap().to_str().unwrap());
-        if let Err(error) = read(Path::new("cases/unit_cell_shear.json"), &[set]) {
-            panic!("{error}");
-        }
-    }
-}
-
 fn help(arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_tricot")).args(arguments).arg("--help").output().unwrap();
     assert!(output.status.success(), "{arguments:?}");
