@@ -3,6 +3,7 @@
 use crate::case::FabricSource;
 use crate::contact::EMPTY;
 use crate::contact::candidates::MADE;
+use crate::mesh::Thread;
 use crate::rigs;
 use crate::rigs::read::Loaded;
 use crate::settings::effects::Contact;
@@ -16,7 +17,7 @@ pub struct Effect {
     /// Stages that are there for it alone.
     pub stages: &'static [&'static str],
     /// Takes it out of a case; `None` where it is what the case describes.
-    pub off: Option<fn(&mut Loaded)>,
+    pub off: Option<Off>,
 }
 
 impl Effect {
@@ -39,174 +40,165 @@ fn contact(loaded: &mut Loaded, change: impl Fn(&mut Contact)) {
 
 /// The effects of a scene that has begun.
 pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
-    let (active, effects) = (simulation.model.active, &loaded.case.effects);
-    let written = |path: &str| {
-        let covers = |default: &str| {
-            let inside =
-                |a: &str, b: &str| a.strip_prefix(b).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-            inside(default, path) || inside(path, default)
-        };
-        let default = loaded.defaults.iter().any(|(default, _)| covers(default));
+    let mut found = Found { loaded, simulation, effects: Vec::new() };
+    found.contact();
+    found.bodies();
+    found.numerics();
+    found.scene();
+    found.effects
+}
+
+/// Takes an effect out of a case.
+type Off = fn(&mut Loaded);
+
+/// The effects found so far.
+struct Found<'a> {
+    loaded: &'a Loaded,
+    simulation: &'a Simulation,
+    effects: Vec<Effect>,
+}
+
+impl Found<'_> {
+    fn add(&mut self, name: &'static str, cause: String, stages: &'static [&'static str], off: Option<Off>) {
+        self.effects.push(Effect { name, cause, stages, off });
+    }
+
+    /// The path of a field, and whether it was written or is there by default.
+    fn written(&self, path: &str) -> String {
+        let inside = |a: &str, b: &str| a.strip_prefix(b).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+        let covers = |default: &str| inside(default, path) || inside(path, default);
+        let default = self.loaded.defaults.iter().any(|(default, _)| covers(default));
         if default { format!("{path} by default") } else { path.to_owned() }
-    };
-    let mut found = Vec::new();
-    let mut add = |is_on: bool, name, cause: &dyn Fn() -> String, stages, off| {
-        if is_on {
-            found.push(Effect { name, cause: cause(), stages, off });
+    }
+
+    /// Contact by kind of pair, friction, damping, and ties.
+    fn contact(&mut self) {
+        let (active, written) = (self.simulation.model.active, |path: &str| self.written(path));
+        let settings = self.loaded.case.effects.contact.as_ref();
+        let skin = settings.map_or(0.0, |contact| contact.skin_mm);
+        let [threads_near, yarns_near, pairs_near] = near(self.simulation);
+        let pairs: [(bool, &'static str, String, &'static [&'static str], Off); 3] = [
+            (
+                active.thread_yarn,
+                "thread-yarn contact",
+                format!(
+                    "{}; {threads_near} nodes of threads are closer than {skin} mm to a yarn",
+                    written("effects.contact.thread_yarn")
+                ),
+                &["thread-yarn candidates", "thread-yarn contact"],
+                |l| contact(l, |c| c.thread_yarn = false),
+            ),
+            (
+                active.yarn_yarn,
+                "yarn-yarn contact",
+                format!(
+                    "{}; {yarns_near} nodes of yarns are closer than {skin} mm to another yarn",
+                    written("effects.contact.yarn_yarn")
+                ),
+                &["yarn-yarn candidates", "yarn-yarn contact"],
+                |l| contact(l, |c| c.yarn_yarn = false),
+            ),
+            (
+                active.thread_thread,
+                "thread-thread contact",
+                format!(
+                    "{}; {pairs_near} pairs of beams are closer than {skin} mm",
+                    written("effects.contact.thread_thread")
+                ),
+                &["threads to grid", "thread-thread candidates", "thread-thread contact"],
+                |l| contact(l, |c| c.thread_thread = false),
+            ),
+        ];
+        for (_, name, cause, stages, off) in pairs.into_iter().filter(|(is_on, ..)| *is_on) {
+            self.add(name, cause, stages, Some(off));
         }
-    };
-    let thread = |largest: fn(&crate::mesh::Thread) -> f64| {
-        simulation
-            .mesh()
-            .threads
-            .iter()
-            .map(largest)
-            .fold(0.0, |most: f64, x| if x.abs() > most.abs() { x } else { most })
-    };
-    let [threads_near, yarns_near, pairs_near] = near(simulation);
-    let skin = effects.contact.as_ref().map_or(0.0, |contact| contact.skin_mm);
-    add(
-        active.thread_yarn,
-        "thread-yarn contact",
-        &|| {
-            format!(
-                "{}; {threads_near} nodes of threads are closer than {skin} mm to a yarn",
-                written("effects.contact.thread_yarn")
-            )
-        },
-        &["thread-yarn candidates", "thread-yarn contact"],
-        Some(|l| contact(l, |c| c.thread_yarn = false)),
-    );
-    add(
-        active.yarn_yarn,
-        "yarn-yarn contact",
-        &|| {
-            format!(
-                "{}; {yarns_near} nodes of yarns are closer than {skin} mm to another yarn",
-                written("effects.contact.yarn_yarn")
-            )
-        },
-        &["yarn-yarn candidates", "yarn-yarn contact"],
-        Some(|l| contact(l, |c| c.yarn_yarn = false)),
-    );
-    add(
-        active.thread_thread,
-        "thread-thread contact",
-        &|| {
-            format!(
-                "{}; {pairs_near} pairs of beams are closer than {skin} mm",
-                written("effects.contact.thread_thread")
-            )
-        },
-        &["threads to grid", "thread-thread candidates", "thread-thread contact"],
-        Some(|l| contact(l, |c| c.thread_thread = false)),
-    );
-    add(
-        active.friction,
-        "friction",
-        &|| {
-            format!(
-                "{} and a coefficient of friction of {}",
-                written("effects.contact.friction"),
-                simulation.mesh().friction
-            )
-        },
-        &[],
-        Some(|l| contact(l, |c| c.friction = false)),
-    );
-    add(
-        active.searches() && effects.contact.as_ref().is_some_and(|c| c.damping_ratio > 0.0),
-        "contact damping",
-        &|| written("effects.contact.damping_ratio"),
-        &[],
-        Some(|l| contact(l, |c| c.damping_ratio = 0.0)),
-    );
-    add(
-        active.ties,
-        "ties",
-        &|| {
-            let count =
-                simulation.model.plan.step.iter().find(|stage| stage.name == "ties").map_or(0, |stage| stage.count);
-            format!("{}; {count} nodes of cut threads are held", written("domain.specimen.thread_ends"))
-        },
-        &["ties"],
-        Some(|l| {
-            rigs::of_mut(&mut l.case.domain).free_thread_ends();
-        }),
-    );
-    add(
-        active.bending,
-        "bending",
-        &|| format!("{}; a thread has EI = {:.3e} N mm² > 0", written("effects.bending"), thread(|t| t.bending)),
-        &["bend"],
-        Some(|l| l.case.effects.bending = false),
-    );
-    add(
-        active.thermal,
-        "thermal strain",
-        &|| format!("a pretension step, and a thread with a thermal strain of {} in it", thread(|t| t.thermal_strain)),
-        &[],
-        Some(|l| {
-            if let Some(FabricSource::Inline(fabric)) = &mut l.case.fabric {
-                fabric.stitch.thermal_strain = 0.0;
-            }
-            rigs::of_mut(&mut l.case.domain).relax_threads();
-        }),
-    );
-    add(
-        active.gravity,
-        "gravity",
-        &|| written("effects.gravity_mm_s2"),
-        &[],
-        Some(|l| l.case.effects.gravity_mm_s2 = None),
-    );
-    add(active.damping, "damping", &|| written("effects.damping"), &[], Some(|l| l.case.effects.damping = None));
-    add(
-        active.fibre_lines,
-        "fibre lines",
-        &|| format!("{}; fibres and threads of two nodes or more", written("effects.fibre_lines")),
-        &["fibre lines", "hold"],
-        Some(|l| l.case.effects.fibre_lines = None),
-    );
-    add(
-        active.contact_mass,
-        "contact-aware mass",
-        &|| format!("{}; bodies can touch", written("effects.contact_mass")),
-        &[],
-        Some(|l| l.case.effects.contact_mass = None),
-    );
-    let (mass, truly) = (&simulation.model.mass, &simulation.model.true_mass);
-    let heavier = mass.iter().zip(truly).filter(|(mass, truly)| mass > truly).count();
-    add(
-        heavier > 0,
-        "mass floor",
-        &|| {
-            format!(
-                "{}; {heavier} nodes would be lighter than {} of the mean of their body",
-                written("effects.mass_floor"),
-                effects.mass_floor
-            )
-        },
-        &[],
-        Some(|l| l.case.effects.mass_floor = 0.0),
-    );
-    add(active.periodic, "periodicity", &|| "domain.cell".into(), &["total kinetic energy"], None);
-    let prescribed = simulation.prescribed_nodes().len();
-    add(
-        prescribed > 0,
-        "prescribed motion",
-        &|| format!("{prescribed} nodes of {}", grips(simulation)),
-        &["prescribed"],
-        None,
-    );
-    add(
-        true,
-        "energies by mode",
-        &|| "guards look at the balance of energies between steps".into(),
-        &["hex8 energy", "hex8 reduced energy", "totals", "totals taken", "kinetic energy", "axial energy"],
-        None,
-    );
-    found
+        if active.friction {
+            let coefficient = self.simulation.mesh().friction;
+            let cause =
+                format!("{} and a coefficient of friction of {coefficient}", self.written("effects.contact.friction"));
+            self.add("friction", cause, &[], Some(|l| contact(l, |c| c.friction = false)));
+        }
+        if active.searches() && settings.is_some_and(|c| c.damping_ratio > 0.0) {
+            let cause = self.written("effects.contact.damping_ratio");
+            self.add("contact damping", cause, &[], Some(|l| contact(l, |c| c.damping_ratio = 0.0)));
+        }
+        if active.ties {
+            let count = self.simulation.scene.ties.len();
+            let cause =
+                format!("{}; {count} nodes of cut threads are held", self.written("domain.specimen.thread_ends"));
+            self.add("ties", cause, &["ties"], Some(|l| rigs::of_mut(&mut l.case.domain).free_thread_ends()));
+        }
+    }
+
+    /// What bodies do by themselves, and gravity.
+    fn bodies(&mut self) {
+        let active = self.simulation.model.active;
+        let thread = |of: fn(&Thread) -> f64| {
+            let values = self.simulation.mesh().threads.iter().map(of);
+            values.fold(0.0, |most: f64, x| if x.abs() > most.abs() { x } else { most })
+        };
+        let (bending, strain) = (thread(|t| t.bending), thread(|t| t.thermal_strain));
+        if active.bending {
+            let cause = format!("{}; a thread has EI = {bending:.3e} N mm² > 0", self.written("effects.bending"));
+            self.add("bending", cause, &["bend"], Some(|l| l.case.effects.bending = false));
+        }
+        if active.thermal {
+            let cause = format!("a pretension step, and a thread with a thermal strain of {strain} in it");
+            let off: Off = |l| {
+                if let Some(FabricSource::Inline(fabric)) = &mut l.case.fabric {
+                    fabric.stitch.thermal_strain = 0.0;
+                }
+                rigs::of_mut(&mut l.case.domain).relax_threads();
+            };
+            self.add("thermal strain", cause, &[], Some(off));
+        }
+        if active.gravity {
+            let cause = self.written("effects.gravity_mm_s2");
+            self.add("gravity", cause, &[], Some(|l| l.case.effects.gravity_mm_s2 = None));
+        }
+        if active.damping {
+            let cause = self.written("effects.damping");
+            self.add("damping", cause, &[], Some(|l| l.case.effects.damping = None));
+        }
+    }
+
+    /// What makes steps long.
+    fn numerics(&mut self) {
+        let model = &self.simulation.model;
+        if model.active.fibre_lines {
+            let cause = format!("{}; fibres and threads of two nodes or more", self.written("effects.fibre_lines"));
+            self.add("fibre lines", cause, &["fibre lines", "hold"], Some(|l| l.case.effects.fibre_lines = None));
+        }
+        if model.active.contact_mass {
+            let cause = format!("{}; bodies can touch", self.written("effects.contact_mass"));
+            self.add("contact-aware mass", cause, &[], Some(|l| l.case.effects.contact_mass = None));
+        }
+        let heavier = model.mass.iter().zip(&model.true_mass).filter(|(mass, truly)| mass > truly).count();
+        if heavier > 0 {
+            let floor = self.loaded.case.effects.mass_floor;
+            let cause = format!(
+                "{}; {heavier} nodes would be lighter than {floor} of the mean of their body",
+                self.written("effects.mass_floor")
+            );
+            self.add("mass floor", cause, &[], Some(|l| l.case.effects.mass_floor = 0.0));
+        }
+    }
+
+    /// What the case describes, and what is there in any case.
+    fn scene(&mut self) {
+        if self.simulation.model.active.periodic {
+            self.add("periodicity", "domain.cell".into(), &["total kinetic energy"], None);
+        }
+        let prescribed = self.simulation.prescribed_nodes().len();
+        if prescribed > 0 {
+            let cause = format!("{prescribed} nodes of {}", grips(self.simulation));
+            self.add("prescribed motion", cause, &["prescribed"], None);
+        }
+        let cause = "guards look at the balance of energies between steps".into();
+        let stages =
+            &["hex8 energy", "hex8 reduced energy", "totals", "totals taken", "kinetic energy", "axial energy"];
+        self.add("energies by mode", cause, stages, None);
+    }
 }
 
 /// Names of what prescribes motion, the first few.

@@ -1,5 +1,7 @@
 //! Case in, results out: owns the plan, the backend, the schedule, the measures and the outputs of one run.
 
+#![warn(clippy::too_many_lines)]
+
 mod check;
 pub mod clock;
 mod devices;

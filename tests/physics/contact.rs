@@ -1,23 +1,18 @@
 //! Contact: collisions, Hertz, a patch of uniform pressure, an edge, and the search against brute force.
 
-use crate::common::{
-    Random, advance, bare, below, block, cross, loaded, momenta, near, neo_hookean, norm, positions, shaped, start,
-    with,
-};
+use super::brute_force::{push, sub};
+use crate::common::{advance, bare, below, block, momenta, near, neo_hookean, norm, positions, shaped, start, with};
 use serde_json::{Value, json};
-use std::collections::BTreeSet;
 use std::f64::consts::PI;
-use tricot::contact::{arc, found};
-use tricot::mesh::Mesh;
-use tricot::mesh::surface::Surface;
+use tricot::contact::arc;
 use tricot::settings::integration::Precision::{self, F32, F64};
 use tricot::simulate::Simulation;
 
-fn scene(blocks: Value, contact: Value) -> Value {
+pub(super) fn scene(blocks: Value, contact: Value) -> Value {
     with(bare(), &[("/domain/mesh/blocks", blocks), ("/effects/contact", contact)])
 }
 
-fn field(simulation: &Simulation, name: &str) -> Vec<f64> {
+pub(super) fn field(simulation: &Simulation, name: &str) -> Vec<f64> {
     simulation.frame().node_fields.into_iter().find(|f| f.name == name).unwrap().values
 }
 
@@ -184,63 +179,6 @@ fn pressure_through_meshes_that_do_not_match() {
     }
 }
 
-/// From the closest point of a bilinear face to a point, by sampling and shrinking.
-fn offset(corners: &[[f64; 3]; 4], point: [f64; 3]) -> [f64; 3] {
-    let at = |s: f64, t: f64| {
-        let w = [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t];
-        [0, 1, 2].map(|k| point[k] - (0..4).map(|a| w[a] * corners[a][k]).sum::<f64>())
-    };
-    let (mut s, mut t, mut step, mut best) = (0.5, 0.5, 0.5, at(0.5, 0.5));
-    for _ in 0..40 {
-        let (from_s, from_t) = (s, t);
-        for i in -4..=4 {
-            for j in -4..=4 {
-                let here = [from_s + f64::from(i) * 0.25 * step, from_t + f64::from(j) * 0.25 * step];
-                let here = here.map(|x: f64| x.clamp(0.0, 1.0));
-                let d = at(here[0], here[1]);
-                if norm(d) < norm(best) {
-                    (best, s, t) = (d, here[0], here[1]);
-                }
-            }
-        }
-        step *= 0.6;
-    }
-    best
-}
-
-fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|k| a[k] - b[k])
-}
-
-/// From the closest point of an edge to a point.
-fn from_edge([a, b]: [[f64; 3]; 2], point: [f64; 3]) -> [f64; 3] {
-    let (along, to) = (sub(b, a), sub(point, a));
-    let dot = |x: [f64; 3], y: [f64; 3]| (0..3).map(|k| x[k] * y[k]).sum::<f64>();
-    let share = (dot(along, to) / dot(along, along)).clamp(0.0, 1.0);
-    [0, 1, 2].map(|k| to[k] - share * along[k])
-}
-
-/// What the closed surface of the first block does to a point outside, for each unit of penalty: faces less edges plus corners, each
-/// by how deep the point lies in its radius, away from where it is closest, mm.
-fn push(mesh: &Mesh, places: &[[f64; 3]], point: [f64; 3], radius: f64) -> [f64; 3] {
-    let faces = Surface::new(&mesh.blocks[0]).closed();
-    let mut sum = [0.0; 3];
-    let mut add = |sign: f64, away: [f64; 3]| {
-        let depth = (radius - norm(away)).max(0.0);
-        sum = [0, 1, 2].map(|k| sum[k] + sign * depth * away[k] / norm(away));
-    };
-    let (mut edges, mut corners) = (BTreeSet::new(), BTreeSet::new());
-    for face in &faces {
-        let nodes = face.map(|seen| seen.node);
-        add(1.0, offset(&nodes.map(|node| places[node]), point));
-        edges.extend((0..4).map(|a| [nodes[a].min(nodes[(a + 1) % 4]), nodes[a].max(nodes[(a + 1) % 4])]));
-        corners.extend(nodes);
-    }
-    edges.into_iter().for_each(|ends: [usize; 2]| add(-1.0, from_edge(ends.map(|node| places[node]), point)));
-    corners.into_iter().for_each(|node: usize| add(1.0, sub(point, places[node])));
-    sum
-}
-
 /// Moves a thread past a slab that is held, from out of reach to out of reach or from on it, and compares the force on its first
 /// node with what the whole surface does to the points of its beam. At some places the node must be `beyond` the faces.
 fn pass(what: &str, slab: Value, nodes: [[f64; 3]; 2], moved: [f64; 3], beyond: fn([f64; 3]) -> bool) {
@@ -356,159 +294,6 @@ fn what_is_pushed_against_a_cut_end_is_stopped() {
     println!("velocities along the fibre: struck {struck:.1}, striking {striking:.1} mm/s");
     assert!(striking < struck - 500.0 && simulation.energies().contact == 0.0, "not parted");
     assert!(simulation.health().balance.abs() < 5e-3, "{:?}", simulation.health());
-}
-
-#[test]
-fn the_search_finds_what_brute_force_finds() {
-    /// Of threads with one contact point, mm.
-    const LENGTH: f64 = 0.115;
-    let (radius, penalty) = (0.12, 100.0);
-    // a yarn whose flat section bulges and that winds along its length
-    let yarn = shaped("yarn", [12, 10, 2], 1e-9, neo_hookean(1000.0, 0.3), |t| {
-        let across = 2.0 * t[1] - 1.0;
-        let half = 0.25 * (1.1 - across * across).max(0.2).sqrt();
-        [6.0 * t[0], 2.0 * across, half * (2.0 * t[2] - 1.0)]
-    });
-    let winding = |x: &[f64; 3]| {
-        let phase = x[0] * 1.1;
-        [
-            0.1 * (2.0 * x[1]).sin(),
-            0.3 * phase.sin() + 0.2 * x[2],
-            0.25 * (phase + 0.5 * x[1]).cos() + 0.05 * (5.0 * x[1]).sin(),
-        ]
-    };
-    let mesh = tricot::rigs::scene(&loaded(&scene(json!([yarn]), Value::Null)).case).unwrap().mesh;
-    let now: Vec<[f64; 3]> = mesh
-        .nodes
-        .iter()
-        .map(|x| {
-            let w = winding(x);
-            [0, 1, 2].map(|k| x[k] + w[k])
-        })
-        .collect();
-    let faces: Vec<[[f64; 3]; 4]> =
-        Surface::new(&mesh.blocks[0]).closed().into_iter().map(|face| face.map(|seen| now[seen.node])).collect();
-    // points over the faces, on their outer side, in the middle of short threads
-    let mut random = Random(17);
-    let (mut points, mut threads) = (vec![], vec![]);
-    while points.len() < 400 {
-        let f = &faces[((random.draw() + 1.0) * 0.5 * faces.len() as f64) as usize % faces.len()];
-        let (s, t, high) = (0.5 + 0.5 * random.draw(), 0.5 + 0.5 * random.draw(), 0.1 + 0.1 * random.draw());
-        let w = [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t];
-        let on: [f64; 3] = [0, 1, 2].map(|k| (0..4).map(|a| w[a] * f[a][k]).sum());
-        let normal = cross(sub(f[2], f[0]), sub(f[3], f[1]));
-        let point = [0, 1, 2].map(|k| on[k] + high * normal[k] / norm(normal));
-        let along = [random.draw(), random.draw(), random.draw()];
-        let end = |side: f64| [0, 1, 2].map(|k| point[k] + side * 0.5 * LENGTH * along[k] / norm(along));
-        threads
-            .push(json!({ "name": format!("t{}", points.len()), "nodes": [end(-1.0), end(1.0)], "radius_mm": radius,
-                             "axial_n": 1, "linear_density_tex": 10 }));
-        points.push(point);
-    }
-    let case = with(
-        scene(json!([yarn]), json!({ "thread_penalty_n_mm2": penalty, "thread_thread": false, "damping_ratio": 0 })),
-        &[
-            ("/domain/mesh/threads", json!(threads)),
-            ("/domain/mesh/conditions", json!([{ "within": [[-9, -9, -9], [9, 9, 9]] }])),
-            ("/integration", json!({ "dt_s": 1e-8, "energy_tolerance": 100, "penetration_tolerance": 100 })),
-        ],
-    );
-    for (precision, allowed) in [(F64, 1e-6), (F32, 1e-5)] {
-        let mut simulation = start(&case, precision);
-        let mut moved = vec![[0.0; 3]; simulation.mesh().nodes.len()];
-        for (moved, x) in moved.iter_mut().zip(&mesh.nodes) {
-            *moved = winding(x);
-        }
-        simulation.set_fluctuations(&moved);
-        advance(&mut simulation, 0.5e-8);
-        let force = field(&simulation, "contact_force_n");
-        let first = simulation.mesh().first_thread_node();
-        let (mut worst, mut touching) = (0.0f64, 0);
-        for (i, point) in points.iter().enumerate() {
-            let expected = norm(push(&mesh, &now, *point, radius));
-            let got = (force[first + 2 * i] + force[first + 2 * i + 1]) / (penalty * LENGTH);
-            touching += usize::from(expected > 0.0);
-            if (got - expected).abs() > allowed {
-                println!("point {i} at {point:.3?}: push {expected:.6}, contact found {got:.6}");
-            }
-            worst = worst.max((got - expected).abs());
-        }
-        assert!(touching > 100, "{touching} points touch");
-        let name = format!("{precision:?}: push on 400 points ({touching} touch) of {} faces, mm", faces.len());
-        below(&name, worst, allowed);
-    }
-}
-
-/// A slab and two threads that nothing but conditions moves: the slab, the first and the second by displacements, mm.
-fn moved_apart(displacements: [[f64; 3]; 3], high: f64, precision: Precision) -> Simulation {
-    let slab = block("slab", [16, 4, 1], [[-4.0, -1.0, -0.5], [4.0, 1.0, 0.0]], 1e-9, neo_hookean(1000.0, 0.3));
-    let thread = |name: &str, x: f64| {
-        // over the middles of faces
-        let nodes = [[x, 0.25, high], [x + 0.5, 0.25, high]];
-        json!({ "name": name, "nodes": nodes, "radius_mm": 0.2, "axial_n": 1, "linear_density_tex": 10 })
-    };
-    let everywhere = [[-9, -9, -9], [9, 9, 9]];
-    let conditions = ["slab", "first", "second"]
-        .map(|body| json!({ "within": everywhere, "body": body }))
-        .into_iter()
-        .zip(displacements)
-        .map(|(condition, by)| with(condition, &[("/displacement_mm", json!(by))]));
-    let case = with(
-        scene(json!([slab]), json!({ "thread_penalty_n_mm2": 50, "damping_ratio": 0, "skin_mm": 0.1 })),
-        &[
-            ("/domain/mesh/threads", json!([thread("first", -2.75), thread("second", 0.25)])),
-            ("/domain/mesh/conditions", json!(conditions.collect::<Vec<_>>())),
-            ("/steps", json!([{ "move": { "time_s": 1e-3 } }])),
-            ("/integration", json!({ "dt_s": 2e-7, "energy_tolerance": 100 })),
-        ],
-    );
-    start(&case, precision)
-}
-
-#[test]
-fn contact_is_searched_again_only_where_bodies_move_relative_to_each_other() {
-    // whether the beams of the first and of the second thread were searched again since the last search of everything
-    let again = |simulation: &Simulation| {
-        let when = simulation.backend().uints(simulation.model.buffers.found[0].unwrap());
-        assert!(when.len() == 2 && when.iter().all(|when| *when != found::NEVER));
-        [when[0], when[1]].map(|when| when == found::SINCE)
-    };
-    let ever_again = |simulation: &mut Simulation| {
-        let [mut first, mut second] = again(simulation);
-        for part in 1..=100 {
-            advance(simulation, 1e-5 * f64::from(part));
-            let [now_first, now_second] = again(simulation);
-            (first, second) = (first || now_first, second || now_second);
-        }
-        [first, second]
-    };
-    let force = |simulation: &Simulation| {
-        let first = simulation.mesh().first_thread_node();
-        field(simulation, "contact_force_n")[first..].to_vec()
-    };
-    for (precision, allowed) in [(F64, 3e-6), (F32, 1e-4)] {
-        // the second thread slides over the slab, the first one lies on it
-        let mut simulation = moved_apart([[0.0; 3], [0.0; 3], [2.0, 0.0, 0.0]], 0.15, precision);
-        advance(&mut simulation, 1e-6);
-        assert_eq!(again(&simulation), [false; 2], "the first search is one of everything");
-        let before = force(&simulation);
-        assert_eq!(ever_again(&mut simulation), [false, true], "{precision:?}, {} looks", simulation.searches());
-        // carried along together, neither is
-        let mut carried = moved_apart([[2.0, 0.0, 0.0]; 3], 0.15, precision);
-        advance(&mut carried, 1e-6);
-        assert_eq!(ever_again(&mut carried), [false; 2], "{precision:?}");
-        assert!(simulation.searches() > 50 && carried.searches() > 50);
-        let after = force(&simulation);
-        assert_eq!(before[..2], after[..2], "the thread that lies still");
-        let expected = 50.0 * 0.25 * 0.05;
-        after.iter().for_each(|force| near("force on a thread, N", *force, expected, allowed));
-        // the slab comes up to both, from out of reach
-        let mut simulation = moved_apart([[0.0, 0.0, 0.3], [0.0; 3], [0.0; 3]], 0.4, precision);
-        advance(&mut simulation, 1e-6);
-        assert!(force(&simulation).iter().all(|force| *force == 0.0));
-        advance(&mut simulation, 1e-3);
-        force(&simulation).iter().for_each(|force| near("force on a thread, N", *force, 2.0 * expected, allowed));
-    }
 }
 
 /// Nodes of a yarn before the cut end of another one, below the plane of its upper side, are not in it.
