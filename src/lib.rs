@@ -46,7 +46,7 @@
 //! | [`scene`] | all that the solver needs, and nothing of how it was written |
 //! | [`plan`] | the scene as buffers and stages; reading it is reading the algorithm |
 //! | [`backend`] | runs stages: the CPU, with threads and registers of any width; a GPU, with the WGSL twins of the kernels |
-//! | [`measure`] | widths, thicknesses, gaps, crossings, zones, tensions, shear force |
+//! | [`measure`] | widths, thicknesses, gaps, crossings, tensions, shear force |
 //! | [`schedule`] | load steps as smooth functions of time |
 //! | [`simulate`] | a scene in time: steps, contact searches, energies, guards |
 //! | [`case`] | what a user writes: typed JSON with units, ranges, defaults, schema and overrides |

@@ -5,7 +5,6 @@ pub mod crossings;
 pub mod shear;
 pub mod stitches;
 pub mod yarns;
-pub mod zones;
 
 /// Mean, extremes and standard deviation of some samples; all NaN when there are none.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,11 +1,11 @@
 //! Crossings of warp and weft during a run: means in every row, all of them as a table and a map at every frame, and as maps in the
 //! report.
 
+use super::bias_extension::zones::{Means, Strip, Zone};
 use super::observer::Tables;
 use crate::error::Result;
 use crate::measure::crossings::{Crossing, Crossings, angles, slips};
 use crate::measure::yarns::{self, Yarn};
-use crate::measure::zones::{Means, Strip, Zone};
 use crate::mesh::Mesh;
 use crate::mesh::frame::{Field, Frame};
 use crate::output::chart;

@@ -4,11 +4,11 @@
 use crate::common::{advance, below, loaded, near};
 use serde_json::{Value, json};
 use tricot::measure::crossings::{Crossings, angles, slips};
-use tricot::measure::shear::Bias;
 use tricot::measure::yarns;
-use tricot::measure::zones::{self, Strip, Zone};
 use tricot::mesh::frame::Frame;
 use tricot::mesh::{Block, Mesh, Ply};
+use tricot::rigs::bias_extension::theory::Bias;
+use tricot::rigs::bias_extension::zones::{self, Strip, Zone};
 use tricot::run;
 use tricot::settings::material::Material;
 use tricot::simulate::BackendConfig;

@@ -2,12 +2,12 @@
 //! theory without slip, widths and gaps, sliding at the free edges, and which stitches carry.
 
 use super::strip;
+use super::zones::Zone;
 use crate::case::Case;
 use crate::case::domain::Specimen;
 use crate::error::{Error, Result};
 use crate::fabric;
 use crate::measure::stitches::{Leg, SLACK_BELOW_N, legs};
-use crate::measure::zones::Zone;
 use crate::mesh::{Mesh, Part, Ply};
 use crate::output::columns::Columns;
 use crate::output::results::Results;

@@ -5,7 +5,9 @@ mod clamps;
 mod findings;
 mod observer;
 mod page;
+pub mod theory;
 mod ties;
+pub mod zones;
 
 pub use clamps::clamped;
 
@@ -16,10 +18,10 @@ use crate::case::domain::{Specimen, ThreadEnds};
 use crate::case::provenance::Provenance;
 use crate::error::Result;
 use crate::fabric;
-use crate::measure::zones::Strip;
 use crate::output::page::Page;
 use crate::output::results::Results;
 use crate::simulate::Simulation;
+use zones::Strip;
 
 /// Frames whose crossings are mapped, the last one included.
 const MAPS: usize = 3;

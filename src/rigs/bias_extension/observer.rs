@@ -2,12 +2,12 @@
 
 use super::clamps::clamped;
 use super::strip;
+use super::theory::{Bias, BiasCurve};
+use super::zones::Means;
 use crate::case::domain::Specimen;
 use crate::error::Result;
 use crate::kernel::record::{Record, Recorded};
-use crate::measure::shear::{Bias, BiasCurve};
 use crate::measure::yarns;
-use crate::measure::zones::Means;
 use crate::mesh::frame::Frame;
 use crate::output::table::Table;
 use crate::rigs::crossings::Crossed;

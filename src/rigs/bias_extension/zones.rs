@@ -1,8 +1,8 @@
 //! The three zones of a bias-extension specimen, told by which yarns the clamps hold: both at a point of zone A, one in
 //! zone B, none in zone C.
 
-use super::Spread;
-use super::crossings::Crossing;
+use crate::measure::Spread;
+use crate::measure::crossings::Crossing;
 
 /// Zone of a point in the reference state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
