@@ -69,8 +69,8 @@ fn a_collision_keeps_momentum_and_balances_energy() {
     }
 }
 
-/// A half cylinder of radius 1 (of a rigid core of 0.5) pressed on a rigid plane: force per length, pressure and place of the
-/// nodes that touch.
+/// A half cylinder of radius 1 (of a rigid core of 0.5) pressed on a rigid plane: force per length, and pressure and position of
+/// the nodes in contact.
 fn hertz(elements: [usize; 2], sink: f64) -> (f64, Vec<[f64; 2]>) {
     let width = 0.05;
     // angles dense around the lowest point, layers dense at the surface
@@ -103,7 +103,7 @@ fn hertz(elements: [usize; 2], sink: f64) -> (f64, Vec<[f64; 2]>) {
     (total, touching.collect())
 }
 
-/// Plane strain for all, a rigid core that sinks, a rigid plane.
+/// Conditions: plane strain everywhere, a rigid core that sinks, a rigid plane.
 fn core_conditions(cylinder: Value, width: f64, sink: f64) -> (Value, Value) {
     let nodes: Vec<[f64; 3]> = serde_json::from_value(cylinder["nodes"].clone()).unwrap();
     let mut conditions = vec![
@@ -220,8 +220,8 @@ fn from_edge([a, b]: [[f64; 3]; 2], point: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| to[k] - share * along[k])
 }
 
-/// What the closed surface of the first block does to a point outside, for each unit of penalty: faces less edges plus corners, each
-/// by how deep the point lies in its radius, away from where it is closest, mm.
+/// Force of the closed surface of the first block on a point outside, per unit of penalty: faces less edges plus corners, each by
+/// the depth of the point within its radius, away from the closest point, mm.
 fn push(mesh: &Mesh, places: &[[f64; 3]], point: [f64; 3], radius: f64) -> [f64; 3] {
     let faces = Surface::new(&mesh.blocks[0]).closed();
     let mut sum = [0.0; 3];
@@ -241,8 +241,8 @@ fn push(mesh: &Mesh, places: &[[f64; 3]], point: [f64; 3], radius: f64) -> [f64;
     sum
 }
 
-/// Moves a thread past a slab that is held, from out of reach to out of reach or from on it, and compares the force on its first
-/// node with what the whole surface does to the points of its beam. At some places the node must be `beyond` the faces.
+/// Moves a thread past a held slab, starting and ending out of reach or starting on it, and compares the force on its first node
+/// with the force of the whole surface on the points of its beam. At some places the node must be `beyond` the faces.
 fn pass(what: &str, slab: Value, nodes: [[f64; 3]; 2], moved: [f64; 3], beyond: fn([f64; 3]) -> bool) {
     let (radius, penalty) = (0.2, 50.0);
     let thread =
@@ -321,7 +321,7 @@ fn a_thread_passes_a_thin_end_smoothly() {
     pass("the thin end", slab, nodes, [0.0, 0.05, -0.6], |x| x[2].abs() < 0.05);
 }
 
-/// In front of a valley either side is where a walk over the surface may end; the ridge beyond it is nearer.
+/// In front of a valley a walk over the surface may end on either side; the ridge beyond is nearer.
 #[test]
 fn a_thread_passes_a_ridge_behind_a_valley_smoothly() {
     let slab = shaped("slab", [4, 8, 1], 1e-9, neo_hookean(1000.0, 0.3), |t| {
@@ -332,7 +332,7 @@ fn a_thread_passes_a_ridge_behind_a_valley_smoothly() {
     pass("the ridge", slab, nodes, [0.0, 1.1, 0.0], |x| x[1] > 0.3);
 }
 
-/// A block that flies against the cut end of another one is stopped by the cap there and flies back.
+/// A block that hits the cut end of another one is stopped by the cap there and bounces back.
 #[test]
 fn what_is_pushed_against_a_cut_end_is_stopped() {
     let yarn = block("yarn", [6, 3, 2], [[0.0, 0.0, 0.0], [1.2, 0.9, 0.4]], 1e-9, neo_hookean(200.0, 0.3));
@@ -439,7 +439,7 @@ fn the_search_finds_what_brute_force_finds() {
     }
 }
 
-/// A slab and two threads that nothing but conditions moves: the slab, the first and the second by displacements, mm.
+/// A slab and two threads, moved by conditions only: displacements of the slab, the first and the second thread, mm.
 fn moved_apart(displacements: [[f64; 3]; 3], high: f64, precision: Precision) -> Simulation {
     let slab = block("slab", [16, 4, 1], [[-4.0, -1.0, -0.5], [4.0, 1.0, 0.0]], 1e-9, neo_hookean(1000.0, 0.3));
     let thread = |name: &str, x: f64| {
@@ -511,7 +511,7 @@ fn contact_is_searched_again_only_where_bodies_move_relative_to_each_other() {
     }
 }
 
-/// Nodes of a yarn before the cut end of another one, below the plane of its upper side, are not in it.
+/// Nodes of a yarn in front of the cut end of another yarn, below the plane of its upper side, are not inside it.
 #[test]
 fn what_is_before_a_cut_end_is_not_behind_its_sides() {
     let yarn = block("yarn", [8, 2, 1], [[0.0, 0.0, 0.0], [2.0, 1.0, 0.4]], 1e-9, neo_hookean(10.0, 0.3));
