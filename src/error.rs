@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-/// What lies behind an error, such as a failure of the file system.
+/// Underlying cause of an error, such as a failure of the file system.
 pub type Cause = Box<dyn std::error::Error + Send + Sync>;
 
 /// Everything that can go wrong between a case file and its results.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The case or fabric file does not say what `tricot` can run: `place` is a file and the JSON path inside it.
+    /// The case or fabric file is not one that `tricot` can run: `place` is a file and the JSON path inside it.
     #[error("{place}: {message}")]
     Case { place: String, message: String },
     /// The parameters are valid one by one, but no fabric can be built from them.
@@ -37,7 +37,7 @@ pub enum Error {
 pub struct Guard {
     /// Short name, such as `non-finite`, `inversion`, `energy`, `contact overflow`.
     pub cause: String,
-    /// Step number at which it was noticed.
+    /// Step number at which the guard tripped.
     pub step: u64,
     /// Time in s.
     pub time: f64,
@@ -66,8 +66,7 @@ impl Error {
         Error::File { path: path.as_ref().to_path_buf(), source: source.into() }
     }
 
-    /// Exit code of the program: 2 bad input, 3 stopped by a guard, 4 files, 5 unsupported, 6 a GPU that
-    /// failed.
+    /// Exit code of the program: 2 bad input, 3 stopped by a guard, 4 files, 5 unsupported, 6 failure of a GPU.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Case { .. } | Error::Geometry { .. } => 2,

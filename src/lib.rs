@@ -1,22 +1,22 @@
 //! Explicit finite elements for dry stitched non-crimp fabrics at the scale of their yarns.
 //!
 //! # What is solved
-//! Yarns are hexahedra of a fibre-bundle law, stitching threads are chains of beams, and everything may touch everything.
-//! In a periodic cell the deformation gradient F̄(t) of the fabric is prescribed, but for the stretches of its two fibre directions
-//! where they follow a membrane force, and the unknown is the fluctuation w:
+//! Yarns are hexahedra with a fibre-bundle law, stitching threads are chains of beams, and all bodies may come into contact. In a
+//! periodic cell the deformation gradient F̄(t) of the fabric is prescribed, except for the stretches of its two fibre directions
+//! where they follow a membrane force. The unknown is the fluctuation w:
 //!
 //! ```text
 //! x = F̄ X + w,   w periodic                                positions (w = displacement in a free scene, F̄ = I)
 //! M ẅ = −∫ P(F) : ∇N dV + f_thread + f_contact − α M ẇ      motion, integrated by central differences
 //! P = ∂W/∂F,   W = elongation + compaction + distortion + longitudinal shear        yarns (Charmetant et al.)
 //! N = EA (l/L₀ − 1 − ε_th),   E_bend = (2 EI/l̄)(tan θ/2 − T₀)²                      threads
-//! f_contact = −∂Ψ/∂x,   |f_t| ≤ μ f_n with true stick                               contact: Ψ of distances, k each depth
+//! f_contact = −∂Ψ/∂x,   |f_t| ≤ μ f_n with true stick                               contact: penalty energy Ψ of depths
 //! P̄ = (1/V) ∂W/∂F̄ by virtual power,   F_nor = dW_ext/dγ / (A₀ cos γ)                what is measured
 //! ```
 //!
-//! Fibres are so stiff that their waves would set the time step. Along each *fibre line* (the nodes of a yarn behind each
-//! other, or a thread) the mass matrix gains β dt² Σ k b bᵀ, which leaves statics and rigid motion as they are; one
-//! tridiagonal solve a line and step pays for it.
+//! Fibres are so stiff that their axial waves would limit the time step. Selective mass scaling raises this limit: along each
+//! *fibre line* (a row of yarn nodes along the fibre, or a thread) the lumped mass matrix gains β dt² Σ k b bᵀ, which changes
+//! neither statics nor rigid motion. It costs one tridiagonal solve per line and step.
 //!
 //! # How data flow
 //! ```text
@@ -28,14 +28,15 @@
 //!                       rig.observer ◄──── simulate: the loop in time ────► measure ─► output: vtu, csv, png, json, page
 //!               └────────── run: one case from end to end; study: many runs ──────────┘
 //! ```
-//! Elements write the forces on their own corners only, and every node gathers them in a fixed order. Contact pairs change,
-//! so contact adds integers: any order gives the same bits. A case therefore gives the same result on any number of threads.
+//! Elements write forces on their own corners only, and every node gathers them in a fixed order. Contact pairs change, so
+//! contact forces are summed as integers: any order gives the same bits. A case therefore gives the same result on any number of
+//! threads.
 //!
 //! # Where things are
 //! | module | what it holds |
 //! |---|---|
 //! | [`error`] | the one error type: every message names its culprit |
-//! | [`kernel`] | what backends share: lanes, elementary functions, positions in quanta, buffers, stages, the text of shaders |
+//! | [`kernel`] | shared by all backends: lanes, elementary functions, positions in quanta, buffers, stages, the text of shaders |
 //! | [`settings`] | effects, load steps, integration, laws: plain structs with their JSON form |
 //! | [`mesh`] | nodes, blocks of hexahedra, threads, frames (deformed states), surfaces, quality |
 //! | [`materials`] | constitutive laws: energy, first Piola–Kirchhoff stress, stiffness |
@@ -43,24 +44,24 @@
 //! | [`contact`] | search and forces: points on closed surfaces, lines on lines, friction |
 //! | [`dynamics`] | assembly, fibre lines, integration, limit of the time step |
 //! | [`conditions`] | prescribed motion |
-//! | [`scene`] | all that the solver needs, and nothing of how it was written |
-//! | [`plan`] | the scene as buffers and stages; reading it is reading the algorithm |
+//! | [`scene`] | the complete input of the solver, independent of the case file |
+//! | [`plan`] | the scene as buffers and stages: the algorithm as data |
 //! | [`backend`] | runs stages: the CPU, with threads and registers of any width; a GPU, with the WGSL twins of the kernels |
 //! | [`measure`] | widths, thicknesses, gaps, crossings, tensions, shear force |
 //! | [`schedule`] | load steps as smooth functions of time |
 //! | [`simulate`] | a scene in time: steps, contact searches, energies, guards |
-//! | [`case`] | what a user writes: typed JSON with units, ranges, defaults, schema and overrides |
-//! | [`fabric`] | from the parameters of a fabric to geometry: yarn sections, the path of the stitch, a cell, a cut piece |
+//! | [`case`] | user input: typed JSON with units, ranges, defaults, schema and overrides |
+//! | [`fabric`] | geometry from the parameters of a fabric: yarn sections, the path of the stitch, a cell, a cut piece |
 //! | [`output`] | frames, tables, maps, pictures, pages, checkpoints |
 //! | [`rigs`] | test rigs: the cell, bias extension, inline meshes; what each checks, builds, measures and reports |
-//! | [`run`] | a case with its files: what the program calls |
+//! | [`run`] | a case with its files, as the program runs it |
 //! | [`study`] | many runs at once: tables over a folder of scenes, how results differ, what accuracy costs |
 //!
-//! Imports point one way: a module knows only those before it in this list (`tests/program/structure.rs` checks it).
+//! Imports point one way: a module uses only the modules before it in this list (`tests/program/structure.rs` checks it).
 //! ```text
 //! error kernel settings mesh materials elements contact dynamics conditions scene plan backend measure schedule simulate case fabric output rigs run study
 //! ```
-//! Moreover, the backend knows only `error` and `kernel`, and `output` does not know `measure`.
+//! Moreover, the backend uses only `error` and `kernel`, and `output` does not use `measure`.
 //!
 //! # From Rust
 //! `examples/cell.rs` shears a cell and prints its force; a [`scene::Scene`] may also be made by hand:
@@ -120,7 +121,7 @@ pub mod simulate;
 #[cfg(feature = "cli")]
 pub mod study;
 
-/// What a user of the library holds most.
+/// The types that users of the library need most.
 pub mod prelude {
     pub use crate::case::Case;
     pub use crate::case::fabric::Fabric;

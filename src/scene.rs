@@ -1,4 +1,4 @@
-//! All that the solver needs, and nothing of how it was written: a user of the library may fill it in without a case.
+//! The complete input of the solver, independent of the case file: a user of the library may build it without a case.
 //!
 //! A test rig makes a scene from a case; the plan turns it into buffers and stages, and a simulation runs it.
 
@@ -16,9 +16,9 @@ pub struct Scene {
     pub mesh: Mesh,
     /// Prescribed motion of nodes.
     pub motions: Vec<Motion>,
-    /// Nodes of threads that are held at yarns; without effect where there is no contact.
+    /// Thread nodes tied to yarns; without effect where there is no contact.
     pub ties: Vec<Tie>,
-    /// Load steps, in the order in which they are run.
+    /// Load steps, in the order in which they run.
     pub steps: Vec<Step>,
     pub effects: Effects,
     pub integration: Integration,
@@ -34,11 +34,11 @@ pub struct Motion {
     pub components: [bool; 3],
     /// Displacement at the end of a `move` step to 1, mm.
     pub displacement: [f64; 3],
-    /// Number of load steps behind which the motion acts; with 0 it does from the start.
+    /// Number of load steps after which the motion acts; with 0 it acts from the start.
     pub after: usize,
 }
 
-/// A node of a thread that stays where it is on a face of a yarn.
+/// A thread node tied to a face of a yarn.
 #[derive(Debug, Clone, Copy)]
 pub struct Tie {
     pub node: usize,
@@ -47,7 +47,7 @@ pub struct Tie {
     pub weights: [f64; 4],
 }
 
-/// What is prescribed at a node.
+/// Prescribed motion of a node.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Prescribed {
     /// Bit k: component k is prescribed.
@@ -67,13 +67,13 @@ pub struct Conflict {
 }
 
 impl Scene {
-    /// Largest displacement that is prescribed, mm.
+    /// Largest prescribed displacement, mm.
     pub fn reach(&self) -> f64 {
         self.motions.iter().map(|motion| norm(motion.displacement)).fold(0.0, f64::max)
     }
 }
 
-/// What motions together prescribe, by node.
+/// Prescribed motion of every node, from all motions together.
 ///
 /// # Errors
 /// Two motions that differ at a node.

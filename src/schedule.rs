@@ -1,4 +1,4 @@
-//! Load steps in time: what is prescribed at any moment, as smooth functions, and as the row of one time step.
+//! Load history: prescribed loads as smooth functions of time, and as the row of one time step.
 
 use crate::kernel::row::Row;
 use crate::measure::shear::gradient;
@@ -12,14 +12,14 @@ pub struct Schedule {
     initial_radius: f64,
 }
 
-/// One load step with its time and what it starts from.
+/// One load step: its times, and the loads at its start and end.
 #[derive(Debug, Clone)]
 pub struct Phase {
     pub name: &'static str,
     /// Start and end, s.
     pub start: f64,
     pub end: f64,
-    /// What holds a cell along x and y, and whether this is the step that brings it there.
+    /// Conditions on a cell along x and y, and whether this step ramps to them.
     pub along: [Along; 2],
     pub stretches: bool,
     from: Load,
@@ -28,7 +28,7 @@ pub struct Phase {
     damping: [f64; 2],
 }
 
-/// What is prescribed at one moment.
+/// Prescribed loads at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Load {
     /// Shear angle, rad.
@@ -41,12 +41,12 @@ pub struct Load {
     pub motion: f64,
 }
 
-/// S(τ) = τ²(3 − 2τ): no velocity at either end.
+/// S(τ) = τ²(3 − 2τ): zero velocity at both ends.
 fn smooth(t: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// A ramp of constant velocity, but for the first and the last tenth, over which the velocity grows and falls linearly.
+/// A ramp of constant velocity, except in the first and last tenths, where the velocity rises and falls linearly.
 pub fn ramp(t: f64) -> f64 {
     const ENDS: f64 = 0.1;
     let rise = |t: f64| t * t / (2.0 * ENDS);
@@ -108,7 +108,7 @@ impl Schedule {
         self.phases.iter().position(|p| time <= p.end).unwrap_or(self.phases.len().saturating_sub(1))
     }
 
-    /// What is prescribed at a time.
+    /// Prescribed loads at a time.
     pub fn load(&self, time: f64) -> Load {
         let Some(phase) = self.phases.get(self.phase_at(time)) else {
             return Load { angle: 0.0, thermal: 0.0, radius: self.initial_radius, motion: 0.0 };
@@ -123,8 +123,8 @@ impl Schedule {
         }
     }
 
-    /// The row of a step at `time` that goes on by `dt` and was reached by `before`; `stretch` is that of the fibre directions of a cell
-    /// at a time, which is known while the run goes on.
+    /// The row of a step of `dt` from `time`, preceded by a step of `before`; `stretch` gives the stretches of a cell along its
+    /// fibre directions at a time, which are known only during the run.
     pub fn row(&self, time: f64, dt: f64, before: f64, stretch: impl Fn(f64) -> [f64; 2]) -> Row<f64> {
         let (now, last) = (self.load(time), self.load((time - before).max(0.0)));
         let next = self.load(time + dt);

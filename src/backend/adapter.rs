@@ -1,4 +1,4 @@
-//! What is known of an adapter before a device is opened on it.
+//! Properties of an adapter before a device is opened on it.
 
 /// An adapter, as `tricot devices` lists it.
 #[derive(Debug, Clone)]
@@ -9,7 +9,7 @@ pub struct Adapter {
     pub driver: String,
     /// Discrete GPU, integrated GPU, virtual GPU, or software.
     pub kind: &'static str,
-    /// A GPU with memory of its own.
+    /// Whether it is a GPU with memory of its own.
     pub is_discrete: bool,
     /// Largest buffer that a stage can bind, bytes.
     pub binding_bytes: u64,

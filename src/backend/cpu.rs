@@ -1,7 +1,7 @@
 //! The CPU backend: stages split into fixed chunks that rayon spreads over threads.
 //!
-//! Stages that do not wait for each other run as one parallel loop. Chunks write disjoint memory or add integers, so the
-//! result does not depend on how many threads there are or which of them takes a chunk.
+//! Stages that do not wait for each other run as one parallel loop. Chunks write disjoint memory or add integers, so the result
+//! does not depend on the number of threads or on which thread takes a chunk.
 
 use super::Backend;
 use crate::kernel::buffer::{Array, Buffer, Description};
@@ -24,7 +24,7 @@ pub struct Cpu<R: Real> {
     precision: std::marker::PhantomData<R>,
 }
 
-/// A precision that the CPU can run: which of a kernel's functions it is.
+/// A precision that the CPU can run, with the matching function of a kernel.
 pub trait Precision: Real {
     fn function(kernel: &Code) -> fn(&Io<Self>, std::ops::Range<usize>);
     const NAME: &'static str;
@@ -95,7 +95,7 @@ struct Bound<'a, R: Real> {
 // SAFETY: bindings are addresses of arrays that outlive the run; `Access` keeps chunks apart.
 unsafe impl<R: Real> Sync for Bound<'_, R> {}
 
-/// Some items of a stage of a group.
+/// A range of items of one stage in a group.
 struct Chunk {
     stage: usize,
     items: std::ops::Range<usize>,

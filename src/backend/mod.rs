@@ -32,9 +32,9 @@ pub trait Backend {
     fn set_bytes(&mut self, buffer: Buffer, bytes: &[u8]);
     /// Keeps a copy of some buffers, in place of the copies kept before.
     fn save(&mut self, buffers: &[Buffer]);
-    /// Brings back what was saved last.
+    /// Restores the last saved copies.
     fn restore(&mut self);
-    /// What made the device fail, once it has: numbers read since then are void.
+    /// The fault of a failed device: numbers read since then are void.
     fn fault(&self) -> Option<String> {
         None
     }

@@ -1,4 +1,4 @@
-//! In place of the GPU backend in a build without the feature `gpu`: there is no device, and who asks for one is told.
+//! Replaces the GPU backend in a build without the feature `gpu`: there is no device, and a request for one is an error.
 
 use super::Backend;
 use super::adapter::Adapter;
@@ -11,14 +11,14 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct Device(Infallible);
 
-/// The adapters of this machine: none is seen.
+/// The adapters of this machine: none.
 pub fn devices() -> Vec<Adapter> {
     Vec::new()
 }
 
 impl Device {
     /// # Errors
-    /// Always: this build cannot.
+    /// Always: this build has no GPU backend.
     pub fn open(_name: &str) -> Result<Arc<Self>> {
         Err(Error::Unsupported(
             "this build has no GPU backend: build it with the feature gpu, or use --backend cpu".into(),

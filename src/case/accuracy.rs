@@ -1,6 +1,7 @@
-//! `"accuracy"`: how much accuracy to buy with time, as one word for many numerical choices.
+//! `"accuracy"`: one word for many numerical choices, which trade time for accuracy.
 //!
-//! The words stand for fields of a case. A field that the case gives itself stays as it is, so a word can be used as a start.
+//! Each word stands for fields of a case. Fields that the case sets itself stay as they are, so a word can serve as a starting
+//! point.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,10 +16,10 @@ pub enum Accuracy {
     Preview,
     /// The mesh of the paper (Zheng et al.), 480 beams in the shipped cell: `resolution.beams_per_lap` 60.
     Paper,
-    /// For results: `resolution.beams_per_lap` 120, and steps up to 1 µs (`integration.dt_max_s` 1e-6) with elements that are
-    /// heavy enough for them (`effects.contact_mass.least_limit_s` 2.3e-6).
+    /// For results: `resolution.beams_per_lap` 120, and steps up to 1 µs (`integration.dt_max_s` 1e-6) with elements made heavy
+    /// enough for them (`effects.contact_mass.least_limit_s` 2.3e-6).
     Engineering,
-    /// To judge the others by: `resolution.finer` 1.5, `resolution.beams_per_lap` 90, `integration.precision` f64,
+    /// Reference for the others: `resolution.finer` 1.5, `resolution.beams_per_lap` 90, `integration.precision` f64,
     /// `integration.dt_max_s` 2.5e-7.
     Reference,
 }
@@ -45,13 +46,13 @@ impl Accuracy {
         }
     }
 
-    /// The word in a case that has the shape of one.
+    /// The accuracy word of a case in JSON.
     pub fn of(case: &Value) -> Option<Self> {
         case.get("accuracy").and_then(|word| serde_json::from_value(word.clone()).ok()).flatten()
     }
 }
 
-/// Adds the fields of an object that another one leaves out.
+/// Adds the fields that `given` leaves out.
 pub fn fill(given: &mut Value, fields: &Value) {
     let (Value::Object(given), Value::Object(fields)) = (given, fields) else { return };
     for (name, field) in fields {

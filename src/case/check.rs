@@ -1,4 +1,4 @@
-//! Checks across fields that need no mesh, whatever the test rig. Ranges of single numbers are in the schema.
+//! Checks across fields that need no mesh, for every test rig. Ranges of single numbers are in the schema.
 
 use super::Case;
 use super::provenance::Provenance;
@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::settings::steps::{Along, Step};
 use std::collections::BTreeMap;
 
-/// Most time steps of one case.
+/// Maximum number of time steps of a case.
 pub const MAX_TIME_STEPS: f64 = 1e9;
 
 /// The first contradiction in a case whose single values are in range. `provenance` names files in messages.
@@ -18,7 +18,7 @@ pub fn check(case: &Case, provenance: &Provenance) -> Result<()> {
     probes(case, provenance)
 }
 
-/// Refuses names that are used twice, or that a table cannot hold.
+/// Refuses duplicate names and names that a table cannot hold.
 pub fn distinct<'a>(
     names: impl Iterator<Item = (String, &'a String)>,
     what: &str,
@@ -41,7 +41,7 @@ pub fn distinct<'a>(
     Ok(())
 }
 
-/// Places of probes that the case itself shows to be none.
+/// Refuses probes whose names are duplicate or unfit for a table.
 fn probes(case: &Case, provenance: &Provenance) -> Result<()> {
     let probes = case.output.probes.iter().enumerate();
     distinct(probes.map(|(i, probe)| (format!("output.probes.{i}.name"), &probe.name)), "probe", provenance)

@@ -1,4 +1,4 @@
-//! Which values of a case were not written by its user.
+//! Values of a case that its user left to defaults.
 
 use serde_json::Value;
 

@@ -1,8 +1,8 @@
-//! Where two cases differ: the places in their JSON, with both values.
+//! Differences between two cases: JSON paths with both values.
 
 use serde_json::Value;
 
-/// A place, names and indices joined by dots, and the two values there; `None` where there is none.
+/// A path, names and indices joined by dots, and both values there; `None` for an absent value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Difference<'a> {
     pub place: String,
@@ -16,7 +16,7 @@ impl Difference<'_> {
     }
 }
 
-/// Every place at which two values differ, in the order of the first one. Places in `free` may differ.
+/// Every path at which two values differ, in the order of the first value. Paths for which `free` holds may differ.
 pub fn differences<'a>(a: &'a Value, b: &'a Value, free: &dyn Fn(&str) -> bool) -> Vec<Difference<'a>> {
     let mut found = Vec::new();
     compare(String::new(), [Some(a), Some(b)], free, &mut found);

@@ -1,4 +1,4 @@
-//! What a user says about the piece of fabric that is simulated, and how finely.
+//! The simulated piece of fabric and its mesh resolution.
 
 use crate::settings::material::Material;
 use schemars::JsonSchema;
@@ -10,16 +10,16 @@ use serde::{Deserialize, Serialize};
 pub enum Domain {
     /// A periodic cell of whole repeats: x spans `warps` warp pitches, y spans `wefts` weft pitches.
     Cell(Cell),
-    /// A rectangle cut at an angle out of the fabric and pulled apart: the bias-extension test.
+    /// A rectangle cut from the fabric at an angle and pulled: the bias-extension test.
     Specimen(Specimen),
     /// A mesh written out in the case, for verification scenes.
     Mesh(InlineMesh),
 }
 
 impl InlineThread {
-    /// Whether it is a ring: its last node lies where its first does.
+    /// Whether the thread is a ring: its first and last nodes coincide.
     pub fn is_ring(&self) -> bool {
-        /// Nodes closer than this along every axis are the same place, mm.
+        /// Nodes closer than this along every axis coincide, mm.
         const SAME_MM: f64 = 1e-6;
         let ends = self.nodes.first().zip(self.nodes.last());
         ends.is_some_and(|(first, last)| (0..3).all(|k| (first[k] - last[k]).abs() < SAME_MM))
@@ -45,7 +45,7 @@ impl Default for Cell {
     }
 }
 
-/// A rectangle of fabric centred at the origin, its length along x, clamped at both ends. Nothing holds its long edges.
+/// A rectangle of fabric centred at the origin, its length along x, clamped at both ends. Its long edges are free.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Specimen {
@@ -55,18 +55,18 @@ pub struct Specimen {
     /// Width, mm: W in Eqs 18 and 19. Default 80.
     #[schemars(range(min = 1, max = 500))]
     pub width_mm: f64,
-    /// Angle from the length of the specimen to the warps, counter-clockwise seen from their side, degrees. Default 45.
+    /// Angle from the length of the specimen to the warps, counter-clockwise seen from the warp side, degrees. Default 45.
     #[schemars(range(min = -90, max = 90))]
     pub warp_angle_deg: f64,
-    /// Length of fabric inside each clamp, beyond `length_mm`, mm. All its nodes are held in all directions; with 0 only
-    /// those in the cut faces are. Default 0.
+    /// Length of fabric inside each clamp, beyond `length_mm`, mm. All its nodes are held in all directions; with 0, only the
+    /// nodes in the cut faces are. Default 0.
     #[schemars(range(min = 0, max = 200))]
     pub clamp_mm: f64,
-    /// Moment from which the clamps hold. Default `start`.
+    /// When the clamps begin to hold. Default `start`.
     pub clamps: Clamps,
-    /// What becomes of threads at cuts. Default `held`.
+    /// How threads behave at cuts. Default `held`.
     pub thread_ends: ThreadEnds,
-    /// Displacement of the clamp at x > 0, away from the other one, at the end of the `move` step, mm. Default 60.
+    /// Displacement of the clamp at x > 0, away from the other clamp, at the end of the `move` step, mm. Default 60.
     #[schemars(range(min = 0, max = 200))]
     pub displacement_mm: f64,
 }
@@ -78,19 +78,17 @@ pub enum Clamps {
     /// From the start: the stitch tightens between held ends.
     #[default]
     Start,
-    /// From the end of the pretension step: the ends may draw in before.
+    /// From the end of the pretension step: until then the ends may draw in.
     AfterPretension,
 }
 
-/// What becomes of the stitch where it is cut: at the ends of threads outside the clamps, and at loops through which no
-/// other loop passes any more.
+/// How the stitch behaves where it is cut: at thread ends outside the clamps, and at loops through which no other loop passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ThreadEnds {
-    /// They slide freely: as the stitch tightens, it draws in from the cuts and its loops come undone one after the other.
+    /// Cut ends slide freely. As the stitch tightens, it draws in from the cuts and its loops unravel one after another.
     Free,
-    /// One node of each stays where it is on the yarn beside it, as do thread ends that are caught between the fibres.
-    /// Needs contact.
+    /// One node of each cut end is tied to the yarn beside it, like a thread end caught between fibres. Needs contact.
     #[default]
     Held,
 }
@@ -110,14 +108,14 @@ impl Default for Specimen {
 }
 
 impl Specimen {
-    /// Half of the length of fabric, clamps included, and half of its width, mm.
+    /// Half the length of the fabric, clamps included, and half its width, mm.
     pub fn half(&self) -> [f64; 2] {
         [0.5 * self.length_mm + self.clamp_mm, 0.5 * self.width_mm]
     }
 }
 
-/// Blocks of hexahedra and threads of beams, given node by node. A scene beyond ±250 mm is computed about its middle; it may be
-/// 499 mm long along every axis.
+/// Blocks of hexahedra and threads of beams, given node by node. A scene that reaches beyond ±250 mm is computed about its
+/// middle; it may be 499 mm long along each axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InlineMesh {
@@ -151,7 +149,7 @@ pub struct InlineBlock {
     #[serde(default)]
     #[schemars(inner(inner(range(min = -1e6, max = 1e6))))]
     pub corners: Option<[[f64; 3]; 2]>,
-    /// Every node, mm, slices fastest, then columns, then layers.
+    /// All nodes, mm, with slices fastest, then columns, then layers.
     #[serde(default)]
     #[schemars(inner(inner(range(min = -1e6, max = 1e6))))]
     pub nodes: Option<Vec<[f64; 3]>>,
@@ -164,7 +162,7 @@ pub struct InlineBlock {
     pub density_t_mm3: f64,
     /// Constitutive law.
     pub material: Material,
-    /// Velocity of every node at the start, mm/s. Default zero.
+    /// Initial velocity of every node, mm/s. Default zero.
     #[serde(default)]
     #[schemars(inner(range(min = -1e7, max = 1e7)))]
     pub velocity_mm_s: [f64; 3],
@@ -205,7 +203,7 @@ pub struct InlineThread {
     #[serde(default)]
     #[schemars(range(min = -0.9, max = 0.5))]
     pub thermal_strain: f64,
-    /// Velocity of every node at the start, mm/s. Default zero.
+    /// Initial velocity of every node, mm/s. Default zero.
     #[serde(default)]
     #[schemars(inner(range(min = -1e7, max = 1e7)))]
     pub velocity_mm_s: [f64; 3],
@@ -219,7 +217,7 @@ fn rest_curvature() -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
-    /// Name in the table of reactions. Default `condition N`, N its number from 0.
+    /// Name in the table of reactions. Default `condition N`, N counted from 0.
     #[serde(default)]
     #[schemars(length(min = 1, max = 100))]
     pub name: Option<String>,
@@ -242,7 +240,7 @@ fn all() -> [bool; 3] {
     [true; 3]
 }
 
-/// How finely the fabric is meshed.
+/// Mesh resolution of the fabric.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Resolution {
@@ -255,18 +253,18 @@ pub struct Resolution {
     /// Hexahedra through the thickness of a yarn. Default 2.
     #[schemars(range(min = 1, max = 100))]
     pub layers: usize,
-    /// Length of a hexahedron along the fibre, mm; rounded to a whole number over the yarn. Default 0.303.
+    /// Length of a hexahedron along the fibre, mm; rounded so that a whole number fits the yarn. Default 0.303.
     #[schemars(range(min = 0.001, max = 50))]
     pub slice_mm: f64,
     /// Beams per lap (a loop and its underlap), graded by curvature. Default 90.
     #[schemars(range(min = 8, max = 10_000))]
     pub beams_per_lap: usize,
-    /// Share of `beams_per_lap` by which laps differ from it, at most: some have more beams and others as many less, so that loops
-    /// do not all slip at once. Rounded to whole beams, at least one unless it is 0, which makes all laps alike. Laps that are
-    /// cut at the edge of a specimen have `beams_per_lap`. Default 0.05.
+    /// Largest deviation of a lap from `beams_per_lap`, as a share of it. Some laps have more beams and others as many fewer, so
+    /// that loops do not all slip at once. The deviation is rounded to whole beams, at least one; 0 makes all laps alike. Laps
+    /// cut at the edge of a specimen have `beams_per_lap` beams. Default 0.05.
     #[schemars(range(min = 0, max = 0.2))]
     pub lap_variation: f64,
-    /// Everything but the layers finer by this factor: columns and beams are multiplied by it, the slice is divided. Default 1.
+    /// Refinement factor for everything but the layers: it multiplies columns and beams and divides the slice length. Default 1.
     #[schemars(range(min = 0.1, max = 10))]
     pub finer: f64,
 }
@@ -300,7 +298,7 @@ impl Resolution {
         }
     }
 
-    /// Most beams that a lap has more or less than [`Self::beams_per_lap`].
+    /// Largest difference in beams between a lap and [`Self::beams_per_lap`].
     pub fn lap_spread(&self) -> usize {
         let spread = (self.lap_variation * self.beams_per_lap as f64).round() as usize;
         if self.lap_variation > 0.0 { spread.max(1) } else { 0 }

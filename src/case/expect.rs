@@ -1,19 +1,18 @@
-//! What a case must show when it has run: margins for hard scenes, which a test and `tricot study stability` check.
+//! Expected results of a case: bounds for hard scenes, which a test and `tricot study stability` check.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// How a run must end, and between which bounds its numbers must lie. A quantity that is left out is not checked.
+/// How a run must end, and bounds on its results. A quantity that is left out is not checked.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Expect {
     /// How the run ends. Default `finished`.
     pub verdict: Verdict,
-    /// Largest error of the energy balance at any time, before a guard stops the run, without its sign, over the largest energy of
-    /// the run.
+    /// Largest absolute error of the energy balance before a guard stops the run, over the largest energy of the run.
     pub energy_balance: Option<Bounds>,
-    /// Smallest det F of all hexahedra at any time.
+    /// Smallest det F in any hexahedron at any time.
     pub min_jacobian: Option<Bounds>,
     /// Largest penetration of any kind at any time, mm.
     pub penetration_mm: Option<Bounds>,
@@ -21,18 +20,18 @@ pub struct Expect {
     pub kinetic_mj: Option<Bounds>,
     /// Strain energy of yarns and threads at the end, mJ.
     pub internal_mj: Option<Bounds>,
-    /// Work lost to friction until the end, mJ.
+    /// Work lost to friction during the run, mJ.
     pub friction_mj: Option<Bounds>,
-    /// Largest distance of a node from where it started, at the end, mm.
+    /// Largest distance between the initial and final positions of a node, mm.
     pub displacement_mm: Option<Bounds>,
-    /// Largest distance of a node at the end from where it was when the last load step began, mm.
+    /// Largest distance between the positions of a node at the beginning and end of the last load step, mm.
     pub drift_mm: Option<Bounds>,
-    /// Smallest distance between the lowest and the highest layer of nodes of the first block at the end, over that at the start.
+    /// Smallest final distance between the lowest and highest node layers of the first block, over the initial one.
     pub thickness_ratio: Option<Bounds>,
     /// Largest force in a beam at the end, N.
     pub tension_n: Option<Bounds>,
-    /// Force in the last beam of the first thread over that in its first, mean over the middle half of the last load step, while it slides fast:
-    /// the ratio goes up and down as beams come off what they slide on.
+    /// Force in the last beam of the first thread over the force in its first beam, averaged over the middle half of the last
+    /// load step, while the thread slides fast. The ratio oscillates as beams leave the surface they slide on.
     pub tension_ratio: Option<Bounds>,
     /// Another case that this one must agree with. `null` for none.
     pub same_as: Option<SameAs>,
@@ -51,7 +50,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Whether a number lies between the bounds; not-a-number never does.
+    /// Whether a number lies between the bounds; NaN never does.
     pub fn hold(&self, number: f64) -> bool {
         !number.is_nan() && self.above.is_none_or(|a| number > a) && self.below.is_none_or(|b| number < b)
     }
@@ -63,30 +62,30 @@ impl Bounds {
 pub struct SameAs {
     /// Path of the other case, relative to this one.
     pub case: PathBuf,
-    /// What is compared.
+    /// Quantity to compare.
     pub quantity: Quantity,
     /// Largest difference relative to the other case.
     #[schemars(range(min = 0, max = 1))]
     pub within: f64,
 }
 
-/// What two cases are compared by, at their ends.
+/// Quantity by which the final states of two cases are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
-    /// How far nodes have moved, sorted: the same after a rotation or a mirror.
+    /// Sorted magnitudes of nodal displacements, which are invariant to rotation and reflection.
     Displacements,
     /// Strain energy of yarns and threads.
     InternalEnergy,
 }
 
-/// How a run ends: at the end of its load steps, or stopped by a guard, named by its cause.
+/// How a run ends: after its last load step, or stopped by a guard, named by its cause.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     #[default]
     Finished,
-    /// By any guard: which one is first may be chance.
+    /// Stopped by any guard: which one trips first may be chance.
     Stopped,
     NonFinite,
     PositionRange,
@@ -112,7 +111,7 @@ impl Verdict {
         Self::ContactOverflow,
     ];
 
-    /// As it is called in a table and, for a guard, in its message.
+    /// Name in a table and, for a guard, in its message.
     pub fn name(self) -> &'static str {
         match self {
             Self::Finished => "finished",
@@ -128,7 +127,7 @@ impl Verdict {
         }
     }
 
-    /// Whether a run that ended in one way is as expected.
+    /// Whether a run that ended this way is as expected.
     pub fn covers(self, ended: Self) -> bool {
         self == ended || self == Self::Stopped && ended != Self::Finished
     }

@@ -1,4 +1,4 @@
-//! What a user says about a fabric: yarns, stitch, materials, friction. Usually a file of its own, shared between cases.
+//! Parameters of a fabric: yarns, stitch, materials, friction. Usually a separate file, shared between cases.
 
 use crate::settings::material::Material;
 use schemars::JsonSchema;
@@ -43,12 +43,12 @@ pub struct Yarn {
     #[serde(default = "truncation")]
     #[schemars(range(min = 0.5, max = 0.99))]
     pub truncation: f64,
-    /// Mass of the ply per area, g/m². Sets the density, whatever the mesh. Paper: 300.
+    /// Mass of the ply per area, g/m². Sets the density, independent of the mesh. Paper: 300.
     #[schemars(range(min = 1, max = 10000))]
     pub areal_mass_g_m2: f64,
     /// Constitutive law of the yarn.
     pub material: Material,
-    /// Sizes measured on the real fabric, for comparison; a run takes no notice of them. Default null.
+    /// Sizes measured on the real fabric, for comparison; a run ignores them. Default null.
     #[serde(default)]
     pub measured: Option<Measured>,
 }
@@ -57,7 +57,7 @@ pub struct Yarn {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Measured {
-    /// How they were measured, e.g. `tomography`.
+    /// Method of measurement, e.g. `tomography`.
     #[schemars(length(min = 1, max = 30))]
     pub by: String,
     /// Width, across the yarn.
@@ -95,7 +95,7 @@ pub struct Stitch {
     /// Radius of the thread's envelope, for contact, mm. Paper: 0.1.
     #[schemars(range(min = 0.001, max = 5))]
     pub radius_mm: f64,
-    /// Young's modulus on the area of the envelope, MPa: EA is the measured quantity. Paper: 350.
+    /// Young's modulus referred to the area of the envelope, MPa; EA is the measured quantity. Paper: 350.
     #[schemars(range(min = 0.001, max = 1e7))]
     pub young_mpa: f64,
     /// Bending stiffness, N·mm². Paper: 5.6e-4.
@@ -106,10 +106,11 @@ pub struct Stitch {
     #[serde(default = "linear_density")]
     #[schemars(range(min = 0.01, max = 1e5))]
     pub linear_density_tex: f64,
-    /// Thermal strain that tightens the stitch, additive (Eq. 14), of the length along its path. 0 leaves it as generated. Paper: −0.15.
+    /// Thermal strain along the thread path that tightens the stitch, additive to the elastic strain (Eq. 14). 0 leaves it as generated. Paper: −0.15.
     #[schemars(range(min = -0.9, max = 0.5))]
     pub thermal_strain: f64,
-    /// Share of the generated curvature that is stress-free: 1 threads rest as generated (as in Abaqus), 0 straight. Default 1.
+    /// Share of the generated curvature that is stress-free: with 1, threads are stress-free as generated (as in Abaqus); with 0,
+    /// when straight. Default 1.
     #[serde(default = "rest_curvature")]
     #[schemars(range(min = 0, max = 1))]
     pub rest_curvature: f64,
@@ -117,7 +118,8 @@ pub struct Stitch {
     #[serde(default = "clearance_yarn")]
     #[schemars(range(min = 0, max = 5))]
     pub clearance_yarn_mm: f64,
-    /// Initial clearance between two thread surfaces, mm. Slack in the loops: it takes up part of the thermal strain. Default 0.03.
+    /// Initial clearance between two thread surfaces, mm. This slack in the loops takes up part of the thermal strain. Default
+    /// 0.03.
     #[serde(default = "clearance_thread")]
     #[schemars(range(min = 0, max = 5))]
     pub clearance_thread_mm: f64,

@@ -1,4 +1,4 @@
-//! What a user writes: a typed, checked JSON case.
+//! User input: a typed and checked JSON case.
 
 pub mod accuracy;
 pub mod check;
@@ -40,11 +40,11 @@ pub struct Case {
     pub fabric: Option<FabricSource>,
     /// The piece of fabric.
     pub domain: Domain,
-    /// How much accuracy to buy with time: a word for numerical fields that the case does not give itself. `null` (the
-    /// default) for their own defaults.
+    /// Accuracy bought with time: a word that sets numerical fields which the case leaves out. `null` (the default) keeps their
+    /// own defaults.
     #[serde(default)]
     pub accuracy: Option<Accuracy>,
-    /// How finely it is meshed.
+    /// Mesh resolution.
     #[serde(default)]
     pub resolution: Resolution,
     /// Effects, with their numerical parameters.
@@ -53,13 +53,13 @@ pub struct Case {
     /// Load steps.
     #[schemars(length(min = 1, max = 1000))]
     pub steps: Vec<Step>,
-    /// Integration in time, and over hexahedra.
+    /// Time integration, and integration over hexahedra.
     #[serde(default)]
     pub integration: Integration,
     /// What is written.
     #[serde(default)]
     pub output: Output,
-    /// What the case must show, for scenes that test the solver; a run takes no notice of it. Default null.
+    /// Expected results, for scenes that test the solver; a run ignores them. Default null.
     #[serde(default)]
     pub expect: Option<Expect>,
 }
@@ -75,7 +75,7 @@ pub enum FabricSource {
 }
 
 impl Case {
-    /// The fabric, which has been read from its file if the case names one.
+    /// The fabric, already read from its file if the case names one.
     ///
     /// # Errors
     /// A case without a fabric.

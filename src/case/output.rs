@@ -10,23 +10,23 @@ pub struct Output {
     /// Rows of the tables per load step. Default 200.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub rows_per_step: usize,
-    /// Shear angles at which a frame (VTU) is written, degrees, whatever their sign: each time that the path comes by. A frame is also
+    /// Shear angles, without sign, at which a frame (VTU) is written each time the load passes them, degrees. A frame is also
     /// written at the start and at the end of every load step.
     #[schemars(length(max = 1000), inner(range(min = 0, max = 80)))]
     pub frames_at_deg: Vec<f64>,
-    /// Displacements of a `move` at which a frame is written, mm, in the same way. Default none.
+    /// Displacements of a `move` step at which a frame is written in the same way, mm. Default none.
     #[schemars(length(max = 1000), inner(range(min = 0, max = 512)))]
     pub frames_at_mm: Vec<f64>,
-    /// Frames per load step besides. Default 0.
+    /// Additional frames per load step. Default 0.
     #[schemars(range(min = 0, max = 10_000))]
     pub frames_per_step: usize,
-    /// Places whose displacement is written in every row, to `probes.csv`. Default none.
+    /// Places whose displacement is written to `probes.csv` in every row. Default none.
     #[schemars(length(max = 1000))]
     pub probes: Vec<Probe>,
-    /// Whether pictures are rendered of the frames. Default true.
+    /// Whether the frames are rendered as pictures. Default true.
     pub pictures: bool,
-    /// Seconds of wall time between two checkpoints, which `--resume` goes on from; there is one at the end of every load step
-    /// besides. `null` for none at all. Default 300.
+    /// Wall time between two checkpoints for `--resume`, s. There is also one at the end of every load step. `null` turns
+    /// checkpoints off. Default 300.
     #[schemars(range(min = 0, max = 1_000_000))]
     pub checkpoint_wall_s: Option<f64>,
 }
@@ -60,12 +60,12 @@ pub struct Probe {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Place {
-    /// A node, by its number in the mesh (that of its point in `mesh.vtu`).
+    /// A node, by its number in the mesh (its point number in `mesh.vtu`).
     Node(#[schemars(range(min = 0, max = 1_000_000_000))] usize),
     /// The first node of a thread, by its name.
     FirstOf(String),
     /// The last node of a thread, by its name.
     LastOf(String),
-    /// The mean of all nodes whose reference position is in this box `[[x, y, z], [x, y, z]]`, mm.
+    /// Mean over all nodes whose reference position is in this box `[[x, y, z], [x, y, z]]`, mm.
     Within(#[schemars(inner(inner(range(min = -1e6, max = 1e6))))] [[f64; 3]; 2]),
 }

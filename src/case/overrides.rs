@@ -8,11 +8,11 @@ use serde_json::{Map, Value};
 /// One change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Override {
-    /// As the user wrote it, shortened for messages.
+    /// The user's text, shortened for messages.
     pub text: String,
     /// Names and list indices, joined by dots.
     pub path: String,
-    /// JSON, or else the text itself.
+    /// JSON, or the text itself if it is not JSON.
     pub value: Value,
 }
 
@@ -28,8 +28,8 @@ impl Override {
         Ok(Self { text: shown, path: path.trim().into(), value })
     }
 
-    /// Applies the change. Objects that the case leaves to their defaults are created on the way; names must exist in the
-    /// schema and list entries in the case.
+    /// Applies the change. Objects that the case leaves out are created along the path. Names must exist in the schema, list
+    /// entries in the case.
     pub fn apply(&self, case: &mut Value, schema: &Value) -> Result<()> {
         let names: Vec<&str> = self.path.split('.').collect();
         let mut forms = Shape::new(schema).forms();

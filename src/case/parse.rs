@@ -1,4 +1,4 @@
-//! JSON text into a value, strictly: one name once per object, no comments, no NaN, a limit on size and depth.
+//! Strict JSON parser: unique names in each object, no comments, no NaN, a limit on size and depth.
 
 use crate::error::{Error, Result};
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
@@ -48,7 +48,7 @@ fn read(path: &Path) -> std::result::Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-/// What the operating system says, without its error number.
+/// Message of the operating system, without its error number.
 pub fn reason(error: &std::io::Error) -> String {
     match error.kind() {
         std::io::ErrorKind::NotFound => "no such file".into(),
@@ -56,13 +56,13 @@ pub fn reason(error: &std::io::Error) -> String {
     }
 }
 
-/// The parser's message without the position, with a hint for what people write most often.
+/// The parser's message without the position, with a hint for the most frequent mistakes.
 fn explain(error: &serde_json::Error, text: &str) -> String {
     let message = error.to_string();
     let position = format!(" at line {} column {}", error.line(), error.column());
     let message = message.strip_suffix(&position).unwrap_or(&message);
     let line = text.lines().nth(error.line().saturating_sub(1)).unwrap_or_default();
-    // columns are bytes; the one of a character of several may be any of them
+    // columns count bytes; the column may be any byte of a multi-byte character
     let before = error.column().saturating_sub(1).min(line.len());
     let rest = &line[(0..=before).rev().find(|at| line.is_char_boundary(*at)).unwrap_or(0)..];
     if let Some(odd) = rest.chars().next().filter(|c| !c.is_ascii()) {
@@ -84,7 +84,7 @@ fn explain(error: &serde_json::Error, text: &str) -> String {
     format!("{message}{hint}")
 }
 
-/// A character that JSON has no place for outside text, and what to do.
+/// Describes a character that JSON does not allow outside text, and what to do.
 fn name(odd: char) -> String {
     let code = u32::from(odd);
     match odd {
@@ -100,7 +100,7 @@ fn name(odd: char) -> String {
     }
 }
 
-/// A JSON value whose objects hold every name once.
+/// A JSON value whose objects have unique names.
 struct Strict(Value);
 
 impl<'de> Deserialize<'de> for Strict {
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn numbers_are_read_to_the_last_bit() {
-        // an old example of a number that fast readers miss by one bit
+        // known numbers that fast parsers miss by one bit
         for text in ["0.30000000000000004", "1.1125369292536007e-308", "5e-324", "0.1234567890123456789"] {
             let exact: f64 = text.parse().unwrap();
             assert_eq!(parse(text).unwrap().as_f64().unwrap().to_bits(), exact.to_bits(), "{text}");

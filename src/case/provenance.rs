@@ -1,10 +1,10 @@
-//! Where every part of a case was written: the case file, a fabric file, the command line.
+//! Source of every part of a case: the case file, a fabric file or the command line.
 
 use super::overrides::Override;
 use crate::error::Error;
 use std::path::PathBuf;
 
-/// The files and overrides that a case is made of, to name the right one in a message.
+/// The files and overrides of a case, so that messages can name the source of a value.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Provenance {
     /// The case file.
@@ -21,7 +21,7 @@ impl Provenance {
         Error::case(self.place(path), message)
     }
 
-    /// `FILE: path`, or the override that wrote what is there.
+    /// `FILE: path`, or the override that wrote the value there.
     fn place(&self, path: &str) -> String {
         let join = |source: String, path: &str| match path {
             "" => source,
@@ -39,7 +39,7 @@ impl Provenance {
     }
 }
 
-/// What remains of `path` below `parent`, if it lies there.
+/// The rest of `path` below `parent`, if `path` lies below it.
 fn inside<'a>(path: &'a str, parent: &str) -> Option<&'a str> {
     let rest = path.strip_prefix(parent)?;
     if rest.is_empty() { Some(rest) } else { rest.strip_prefix('.') }

@@ -1,11 +1,11 @@
-//! JSON Schema of a case and of a fabric file. Every range that [`super::validate`] checks is written here, by way of the
-//! attributes on the types, and nowhere else.
+//! JSON Schema of a case and of a fabric file. Attributes on the types are the only source of the ranges that [`super::validate`]
+//! checks.
 
 use super::{Case, fabric::Fabric};
 use schemars::schema_for;
 use serde_json::{Map, Value, json};
 
-/// Name of the field in which a file may say where its schema is, for editors.
+/// Field in which a file may name its schema, for editors.
 pub const SCHEMA: &str = "$schema";
 
 /// Schema of a case.
@@ -24,12 +24,12 @@ pub fn fabric() -> Value {
 }
 
 fn name_schema(fields: &mut Value) {
-    let what = "Where the schema of this file is, for editors; a run takes no notice of it.";
+    let what = "Location of the schema of this file, for editors; a run ignores it.";
     fields[SCHEMA] = json!({ "description": what, "type": "string" });
 }
 
-/// A schema as indented JSON, as `tricot schema` prints it. Alternatives that each have one field of another name become one object
-/// with at most one of these fields: an editor then names the field that is wrong, where of alternatives it can only say that none
+/// A schema as indented JSON, as `tricot schema` prints it. Alternatives with one field each, of different names, become one
+/// object with exactly one of these fields. An editor can then name the wrong field; for alternatives it only reports that none
 /// fits.
 pub fn text(schema: &Value) -> String {
     let mut schema = schema.clone();
@@ -65,7 +65,7 @@ fn merge(node: &mut Value) {
     }
 }
 
-/// A place in a schema, for walking along it.
+/// A node of a schema, for traversal.
 #[derive(Clone, Copy)]
 pub struct Shape<'a> {
     root: &'a Value,
@@ -73,12 +73,12 @@ pub struct Shape<'a> {
 }
 
 impl<'a> Shape<'a> {
-    /// The top of a schema.
+    /// The root of a schema.
     pub fn new(root: &'a Value) -> Self {
         Self { root, node: root }
     }
 
-    /// A keyword of this place, such as `minimum`.
+    /// A keyword of this node, such as `minimum`.
     pub fn get(&self, keyword: &str) -> Option<&'a Value> {
         self.node.get(keyword)
     }
@@ -92,7 +92,7 @@ impl<'a> Shape<'a> {
         text[..end.unwrap_or(text.len())].trim_end_matches('.')
     }
 
-    /// The forms a value may take here: references followed, alternatives flattened.
+    /// The forms a value may take here, with references resolved and alternatives flattened.
     pub fn forms(&self) -> Vec<Shape<'a>> {
         let at = |node| Shape { root: self.root, node };
         if let Some(pointer) = self.get("$ref").and_then(Value::as_str).and_then(|r| r.strip_prefix('#')) {

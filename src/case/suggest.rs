@@ -1,6 +1,6 @@
-//! What a user may have meant by a misspelt name.
+//! Suggestions for a misspelt name.
 
-/// `; did you mean `x`?` when something is close, and the names that are allowed.
+/// `; did you mean `x`?` when a name is close, and the allowed names.
 pub fn advice<'a>(name: &str, allowed: impl IntoIterator<Item = &'a str>) -> String {
     let allowed: Vec<&str> = allowed.into_iter().collect();
     let near = allowed.iter().map(|a| (distance(name, a), *a)).min().filter(|&(d, a)| {

@@ -1,10 +1,10 @@
-//! Does a JSON value have the shape and the ranges of the schema? The first fault, in words for a user.
+//! Checks a JSON value against the types and ranges of the schema, and describes the first fault for a user.
 
 use super::schema::Shape;
 use super::suggest;
 use serde_json::{Map, Value};
 
-/// What is wrong, and where: names and indices joined by dots.
+/// A fault and its path: names and indices joined by dots.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
     pub path: String,
@@ -46,7 +46,7 @@ fn at(value: &Value, shape: Shape, path: &mut Vec<String>) -> Result<(), Fault> 
     }
 }
 
-/// An object of one field, whose name says what it is.
+/// An object of one field, whose name selects the variant.
 fn tagged(fields: &Map<String, Value>, forms: &[Shape], path: &mut Vec<String>) -> Result<(), Fault> {
     let tags: Vec<&str> = forms.iter().flat_map(Shape::names).collect();
     if fields.len() != 1 {

@@ -1,5 +1,5 @@
-//! The periodic cell: straight warps along y above straight wefts along x, bound by closed chains of thread. Nothing is
-//! cut at the border of the cell; what sticks out is what enters on the other side.
+//! The periodic cell: straight warps along y above straight wefts along x, bound by closed chains of thread. Nothing is cut at
+//! the border of the cell: bodies that leave on one side enter on the other.
 
 use super::laps::Laps;
 use super::section::Section;
@@ -70,7 +70,7 @@ fn add_yarn(
         _ => (&layout.weft, resolution.weft_columns, layout.pitch[1], lx, layout.middle[1]),
     };
     let slices = (length / resolution.slice_mm).round() as usize;
-    // Slices of equal quanta, but for the last: their hexahedra share shapes.
+    // All slices but the last have equal lengths in quanta, so that their hexahedra share shapes.
     let slice_length = quantised(length / slices as f64);
     let centre = quantised((index as f64 + 0.5) * pitch);
     let first = mesh.nodes.len();

@@ -1,4 +1,4 @@
-//! What every fabric that is built must fulfil, whatever piece of it: sizes, resolution, shape of hexahedra, room of threads.
+//! Requirements on every piece of fabric: sizes, resolution, shape of hexahedra, room for threads.
 
 use super::{not_negative, positive, require};
 use crate::case::Case;
@@ -7,12 +7,12 @@ use crate::case::fabric::{Fabric, Yarn};
 use crate::error::{Error, Result};
 use crate::mesh::{Block, Mesh, Ply, clearance, quality};
 
-/// Fewest beams that still bend around the corners of a lap.
+/// Fewest beams that can follow the corners of a lap.
 const FEWEST_BEAMS: usize = 24;
-/// Depth to which a thread may start inside a body, as a share of its radius: the penalty takes it up.
+/// Depth to which a thread may start inside a body, as a share of its radius; penalty contact resolves it.
 const DEPTH: f64 = 0.1;
 
-/// Refuses sizes from which no yarn and no stitch can be made.
+/// Refuses sizes from which no yarn or stitch can be made.
 pub fn fabric(fabric: &Fabric) -> Result<()> {
     yarn(&fabric.warp, "warp")?;
     yarn(&fabric.weft, "weft")?;
@@ -46,7 +46,7 @@ fn yarn(yarn: &Yarn, name: &str) -> Result<()> {
     })
 }
 
-/// Refuses a resolution that leaves no element, or bends threads around nothing.
+/// Refuses a resolution without elements, or with too few beams to bend around corners.
 pub fn resolution(resolution: &Resolution) -> Result<()> {
     for (value, name) in [
         (resolution.warp_columns, "warp_columns"),
@@ -84,7 +84,7 @@ pub fn shape(mesh: &Mesh, block: &Block, name: &str) -> Result<()> {
     ))
 }
 
-/// Refuses threads that start deeper inside a yarn or another thread than the start of contact can take up.
+/// Refuses threads that start deeper inside a yarn or another thread than contact at the start can resolve.
 pub fn contact(case: &Case, fabric: &Fabric, mesh: &Mesh) -> Result<()> {
     let Some(contact) = &case.effects.contact else { return Ok(()) };
     let radius = fabric.stitch.radius_mm;

@@ -1,18 +1,18 @@
-//! How many beams each lap of the stitch has.
+//! Number of beams in each lap of the stitch.
 //!
-//! Were all laps divided alike, the nodes of all loops would lie at the same places, and all loops would slip in the same
-//! moment. Two laps behind each other are a pair: what one has more than the mean, the other has less, so every thread has
-//! its total. How much that is follows a low-discrepancy sequence over pairs and threads.
+//! If all laps were divided alike, the nodes of all loops would lie at the same places, and all loops would slip at the same
+//! moment. Two consecutive laps form a pair: one has more beams than the mean, the other as many fewer, so every thread keeps its
+//! total. The difference follows a low-discrepancy sequence over pairs and threads.
 
 use super::stitch::Path;
 use crate::case::domain::Resolution;
 use crate::mesh::Part;
 
-/// Steps of the sequence from pair to pair and from thread to thread, so far from any fraction that no two of many terms are
-/// near each other.
+/// Steps of the sequence from pair to pair and from thread to thread: irrational numbers that fractions approximate badly, so
+/// that no two of many terms are close.
 const STEPS: [f64; 2] = [0.618_033_988_749_895, 0.754_877_666_246_693];
 
-/// Divisions of a lap into all the numbers of beams that laps have.
+/// Divisions of a lap into every number of beams in use.
 pub struct Laps {
     spread: i64,
     /// From the fewest beams to the most.
@@ -29,12 +29,12 @@ impl Laps {
         Self { spread: spread as i64, divisions }
     }
 
-    /// The beams of a lap with as many as the mean.
+    /// The beams of a lap with the mean number of beams.
     pub fn mean(&self) -> &[Beam] {
         self.with(0)
     }
 
-    /// The beams of the lap of a thread in a course; an even course and the next one are a pair.
+    /// The beams of the lap of a thread in a course; an even course and the next one form a pair.
     pub fn lap(&self, thread: i64, course: i64) -> &[Beam] {
         self.with(more(self.spread, thread, course))
     }
@@ -44,7 +44,7 @@ impl Laps {
     }
 }
 
-/// How many beams more than the mean a lap has, at most `spread`, and not none unless that is 0.
+/// Beams of a lap beyond the mean: at most `spread`, and never 0 unless `spread` is.
 fn more(spread: i64, thread: i64, course: i64) -> i64 {
     if spread == 0 {
         return 0;

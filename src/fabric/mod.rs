@@ -1,4 +1,4 @@
-//! From the parameters of a fabric to the mesh of a piece of it.
+//! The mesh of a piece of fabric from the parameters of the fabric.
 
 pub mod cell;
 mod check;
@@ -20,7 +20,7 @@ pub(crate) fn quantised(x: f64) -> f64 {
     (x * QUANTA_PER_MM).round() / QUANTA_PER_MM
 }
 
-/// Refuses a value at a JSON path unless it holds a condition.
+/// Refuses a value at a JSON path unless a condition holds.
 pub(crate) fn require(holds: bool, place: &str, message: impl FnOnce() -> String) -> Result<()> {
     if holds { Ok(()) } else { Err(Error::case(place, message())) }
 }

@@ -1,4 +1,4 @@
-//! A curve given by many points, and its division into beams that are short where it bends.
+//! A curve given by many points, and its division into beams, shorter where it bends.
 
 use crate::mesh::vector::{Vector, between, norm, sub, unit};
 
@@ -10,7 +10,7 @@ pub struct Polyline {
 }
 
 impl Polyline {
-    /// Joins the points; repeated ones are dropped.
+    /// Joins the points and drops repeated ones.
     pub fn new(points: impl IntoIterator<Item = Vector>) -> Self {
         let mut line = Self { points: Vec::new(), arc: Vec::new() };
         for point in points {
@@ -32,15 +32,15 @@ impl Polyline {
         self.arc.last().copied().unwrap_or(0.0)
     }
 
-    /// Point at arc length `s`; the ends beyond the ends.
+    /// Point at arc length `s`, clamped to the ends.
     pub fn at(&self, s: f64) -> Vector {
         let next = self.arc.partition_point(|&a| a <= s).clamp(1, self.arc.len() - 1);
         let [from, to] = [self.arc[next - 1], self.arc[next]];
         between(self.points[next - 1], self.points[next], ((s - from) / (to - from)).clamp(0.0, 1.0))
     }
 
-    /// Arc lengths of the `beams + 1` ends of beams. A beam that subtends curvature κ is given the length √(8ε/κ), with a
-    /// sagitta ε of 0.04 radii, between 0.8 and 6 radii; all lengths are then scaled to the wanted number.
+    /// Arc lengths of the `beams + 1` ends of beams. A beam on a curve of curvature κ has the length √(8ε/κ), with a sagitta ε of
+    /// 0.04 radii, between 0.8 and 6 radii; all lengths are then scaled to the given number.
     pub fn graded(&self, beams: usize, radius: f64) -> Vec<f64> {
         let [sagitta, shortest, longest, window] = [0.04 * radius, 0.8 * radius, 6.0 * radius, 0.4 * radius];
         let steps = (self.length() / (0.1 * radius)).ceil().max(1.0) as usize;

@@ -45,7 +45,7 @@ impl Section {
         2.0 * a * b * (t * (1.0 - t * t).sqrt() + asin(t))
     }
 
-    /// Area of the polygon that `columns` make of the section, mm²: that of its mesh.
+    /// Area of the section when meshed with `columns` columns, which make it a polygon, mm².
     pub fn meshed_area(&self, columns: usize) -> f64 {
         let half = |column: usize| self.half_thickness(self.width * (column as f64 / columns as f64 - 0.5));
         (0..columns).map(|c| self.width / columns as f64 * (half(c) + half(c + 1))).sum()
@@ -96,9 +96,9 @@ impl Section {
         atan2(sin(theta) / b, cos(theta) / a)
     }
 
-    /// Curve at a distance from the upper half, from the upper corner at +u over the top to the one at −u. It starts and
-    /// ends vertically, `corner` beyond the cut faces, turns around the corners with that radius and blends to
-    /// `distance` along the top.
+    /// Curve at a distance from the upper half, from the upper corner at +u over the top to the corner at −u. It starts and ends
+    /// vertically, `corner` beyond the cut faces, turns around the corners with that radius and blends to `distance` along the
+    /// top.
     pub fn offset(&self, distance: f64, corner: f64) -> Vec<[f64; 2]> {
         const ARC: usize = 200;
         const TOP: usize = 4000;

@@ -1,13 +1,13 @@
-//! The specimen of a bias-extension test: a rectangle cut at an angle out of the fabric, its length along x.
+//! The specimen of a bias-extension test: a rectangle cut from the fabric at an angle, its length along x.
 //!
-//! Yarns are cut with all their fibres in the planes of the cut. Inside, slices are perpendicular to the fibre; towards an
-//! end each fibre line is stretched or shortened until its last node lies in the cut, so that every element stays a
-//! hexahedron. At the corners, fibre lines shorter than a slice are left out, and so are yarns of which fewer than three
-//! columns remain. Threads are cut where they leave the rectangle; pieces shorter than a loop bind nothing and are left
-//! out. What lies in a clamp is held, all other ends of yarns are free. Where threads are cut, and where a loop has lost the
-//! next one, the stitch would come undone; [`crate::case::domain::ThreadEnds`] says whether it may.
+//! Yarns are cut with all their fibres in the planes of the cut. Inside, slices are perpendicular to the fibre. Towards an end,
+//! each fibre line is stretched or shortened until its last node lies in the cut, so every element stays a hexahedron. At the
+//! corners, fibre lines shorter than a slice are left out, as are yarns with fewer than three remaining columns. Threads are cut
+//! where they leave the rectangle; pieces shorter than a loop bind nothing and are left out. Nodes in a clamp are held; all other
+//! yarn ends are free. Where threads are cut, and where a loop has lost the next loop, the stitch would unravel;
+//! [`crate::case::domain::ThreadEnds`] says whether it may.
 //!
-//! In the fabric the origin is the middle of a warp and of a gap between two wefts, where a course of the stitch runs.
+//! The origin of the fabric lies at the middle of a warp and of a gap between two wefts, where a course of the stitch runs.
 
 use super::laps::Laps;
 use super::section::Section;
@@ -50,7 +50,7 @@ pub fn build(case: &Case, fabric: &Fabric, specimen: &Specimen) -> Result<Mesh> 
     Ok(mesh)
 }
 
-/// The rectangle, and the fabric in it.
+/// The rectangle and the orientation of the fabric in it.
 struct Cut {
     half: [f64; 2],
     /// Directions of wefts and warps: the fabric's x and y.
@@ -69,7 +69,7 @@ impl Cut {
         x.abs() * self.half[0] + y.abs() * self.half[1]
     }
 
-    /// A point of the fabric in the specimen.
+    /// Transforms a point of the fabric into the specimen.
     fn place(&self, [x, y, z]: Vector) -> Vector {
         let [weft, warp] = self.axes;
         [x * weft[0] + y * warp[0], x * weft[1] + y * warp[1], z]
@@ -99,7 +99,7 @@ impl Cut {
 
 /// Adds the yarns of a ply.
 fn add_ply(mesh: &mut Mesh, cut: &Cut, layout: &Layout, ply: Ply, yarn: &Yarn, resolution: &Resolution) -> Result<()> {
-    // columns run across the fibre so that slices, columns and layers are right-handed
+    // columns run across the fibre such that slices, columns and layers are right-handed
     let [weft, warp] = cut.axes;
     let (name, section, columns, middle, along, across, axis, half_pitch): (_, &Section, _, _, _, _, _, f64) = match ply
     {
@@ -123,7 +123,7 @@ fn add_ply(mesh: &mut Mesh, cut: &Cut, layout: &Layout, ply: Ply, yarn: &Yarn, r
         let [from, step] = [outline.start, outline.step()];
         let centre = offset(0.0);
         let origin = lattice([0, 1].map(|k| centre[k] + from * along[k]));
-        // whole quanta of the same step: the hexahedra inside all yarns share shapes
+        // the same step of whole quanta everywhere: hexahedra inside all yarns share shapes
         let step = lattice(scaled(along, step));
         for row in &grid {
             for (line, [u, v]) in row.iter().enumerate().skip(outline.first).take(outline.lines()) {
@@ -159,13 +159,13 @@ fn add_ply(mesh: &mut Mesh, cut: &Cut, layout: &Layout, ply: Ply, yarn: &Yarn, r
     Ok(())
 }
 
-/// One yarn seen along z: how far its fibre lines reach, and slices between their middles.
+/// One yarn seen along z: the extent of its fibre lines, and the slices between their median ends.
 struct Outline {
-    /// First line that is kept.
+    /// First kept line.
     first: usize,
     /// Ends of the kept lines less the ends of the slices, mm along the fibre.
     shifts: Vec<[f64; 2]>,
-    /// Middle of the ends of lines, mm.
+    /// Median of the starts of lines, mm.
     start: f64,
     length: f64,
     slices: usize,
@@ -174,10 +174,10 @@ struct Outline {
 }
 
 impl Outline {
-    /// The yarn whose lines have these chords; `None` for a sliver.
+    /// The yarn with these chords of its lines; `None` for a sliver.
     fn new(chords: &[Option<[f64; 2]>], width: f64, slice: f64) -> Option<Self> {
         let long = |chord: &Option<[f64; 2]>| chord.is_some_and(|[a, b]| b - a >= slice);
-        // chords of a convex cut: the long ones are neighbours
+        // the cut is convex, so its long chords are neighbours
         let first = chords.iter().position(long)?;
         let kept: Vec<[f64; 2]> = chords[first..].iter().take_while(|c| long(c)).flatten().copied().collect();
         if kept.len() - 1 < FEWEST_COLUMNS.min(chords.len() - 1) {
@@ -202,7 +202,7 @@ impl Outline {
         self.length / self.slices as f64
     }
 
-    /// Shift of a node along its fibre, mm: all of it at the ends, none inside.
+    /// Shift of a node along its fibre, mm: full at the ends, zero inside.
     fn shift(&self, line: usize, slice: usize) -> f64 {
         let [start, end] = self.shifts[line - self.first];
         let share = |slices: usize| (1.0 - slices as f64 * self.step() / self.blend).max(0.0);
@@ -216,8 +216,8 @@ fn median(mut values: Vec<f64>) -> f64 {
     if values.len() % 2 == 1 { values[half] } else { 0.5 * (values[half - 1] + values[half]) }
 }
 
-/// Adds the pieces of thread in the rectangle. Laps of which both of a pair are whole differ in their beams: so every piece has
-/// as many as if all laps were alike, and pieces of one length can be solved side by side.
+/// Adds the pieces of thread in the rectangle. Laps differ in their beams only where both laps of a pair are whole. Every piece
+/// then has as many beams as if all laps were alike, and pieces of equal length can be solved side by side.
 fn add_threads(mesh: &mut Mesh, cut: &Cut, layout: &Layout, fabric: &Fabric, resolution: &Resolution) -> Result<()> {
     let path = layout.path()?;
     let laps = Laps::new(&path, resolution, fabric.stitch.radius_mm);
@@ -249,7 +249,7 @@ fn add_threads(mesh: &mut Mesh, cut: &Cut, layout: &Layout, fabric: &Fabric, res
     Ok(())
 }
 
-/// A piece of thread: nodes with their arc lengths, and the part of the lap of the beam between each and the next.
+/// A piece of thread: nodes with their arc lengths, and the part of the lap of each beam between two nodes.
 #[derive(Default)]
 struct Piece {
     nodes: Vec<(Vector, f64)>,
@@ -257,7 +257,7 @@ struct Piece {
 }
 
 impl Piece {
-    /// Arc length from its first node to its last, mm.
+    /// Arc length from the first node to the last, mm.
     fn length(&self) -> f64 {
         self.nodes.last().map_or(0.0, |(_, end)| end - self.nodes[0].1)
     }
@@ -269,8 +269,8 @@ impl Piece {
     }
 }
 
-/// Cuts a chain of beams, each with its curve and arc lengths on it, where it leaves the rectangle. A beam that would be
-/// less than half left is taken together with its neighbour.
+/// Cuts a chain of beams, each with its curve and arc lengths on it, where it leaves the rectangle. A beam of which less than
+/// half would remain is merged with its neighbour.
 fn pieces<C: Fn(f64) -> Vector>(cut: &Cut, beams: impl Iterator<Item = (C, [f64; 2], Part)>) -> Vec<Piece> {
     let mut pieces = Vec::new();
     let mut piece = Piece::default();
@@ -280,7 +280,7 @@ fn pieces<C: Fn(f64) -> Vector>(cut: &Cut, beams: impl Iterator<Item = (C, [f64;
         let inside = [from, to].map(|arc| cut.holds(curve(arc)));
         match (inside[0], piece.nodes.is_empty()) {
             (true, true) => piece.nodes.push(node(from)),
-            // the end of the beam before lay on the very border
+            // the end of the previous beam lay exactly on the border
             (false, false) => pieces.push(std::mem::take(&mut piece)),
             _ => {}
         }
@@ -314,7 +314,7 @@ fn pieces<C: Fn(f64) -> Vector>(cut: &Cut, beams: impl Iterator<Item = (C, [f64;
     pieces
 }
 
-/// Arc length at which a curve leaves the rectangle, between one inside and one outside.
+/// Arc length at which a curve leaves the rectangle, between an inside and an outside arc length.
 fn leaves(cut: &Cut, curve: impl Fn(f64) -> Vector, mut inside: f64, mut outside: f64) -> f64 {
     for _ in 0..50 {
         let middle = 0.5 * (inside + outside);

@@ -13,7 +13,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// Spacing of the points of a path, mm.
 const SPACING: f64 = 0.004;
 
-/// Measures of a fabric from which the path follows, mm.
+/// Dimensions of a fabric that determine the path, mm.
 #[derive(Debug, Clone)]
 pub struct Layout {
     pub warp: Section,
@@ -28,16 +28,16 @@ pub struct Layout {
     pub bend: f64,
     /// Distance between the axis of a thread and a yarn.
     pub stand_off: f64,
-    /// Shift of both legs towards the warp that the thread goes around.
+    /// Shift of both legs towards the warp that the thread encloses.
     pub shift: f64,
-    /// Length over which the underlap turns out of and into its legs.
+    /// Length over which the underlap turns from and into its legs.
     ramp: f64,
-    /// Which side of its wale the entry leg takes at the weft: −1 the inner (closed lap), 1 the outer (open lap).
+    /// Side of the wale on which the entry leg passes the weft: −1 the inner (closed lap), 1 the outer (open lap).
     entry: f64,
 }
 
-/// Points of one lap from the top of its entry leg to the top of the next, around a warp at x = 0 from the wale at
-/// half a warp pitch, course at y = 0.
+/// Points of one lap from the top of its entry leg to the top of the next entry leg, around a warp at x = 0. Its wale is at half
+/// a warp pitch, its course at y = 0.
 #[derive(Debug, Clone)]
 pub struct Path {
     pub line: Polyline,
@@ -56,7 +56,7 @@ fn sweep(length: f64, from: f64, to: f64, curve: impl Fn(f64) -> Vector) -> impl
 }
 
 impl Layout {
-    /// Takes the measures from a fabric and refuses those that leave no room for a loop.
+    /// Takes the dimensions of a fabric and refuses those that leave no room for a loop.
     pub fn new(fabric: &Fabric) -> Result<Self> {
         let stitch = &fabric.stitch;
         let [warp, weft] = [section(&fabric.warp), section(&fabric.weft)];
@@ -107,14 +107,14 @@ impl Layout {
         Ok(())
     }
 
-    /// Height of the plane of the loop heads: a thread there rests on the weft where the head reaches furthest.
+    /// Height of the plane of the loop heads: a thread in it rests on the weft where the head reaches furthest.
     pub fn head_plane(&self) -> f64 {
         let resting = self.weft.resting_disc(self.bend - self.pitch[1] / 2.0, self.stand_off);
         self.middle[1] - resting.unwrap_or(self.weft.edge() + self.stand_off).max(self.weft.edge())
     }
 
-    /// Angle in the (y, z) plane of the common normal at both ends of the straight piece between the bend of a leg and the
-    /// weft: the line that touches both from below.
+    /// Angle in the (y, z) plane of the normal to the straight piece between the bend of a leg and the weft, the common tangent
+    /// from below.
     pub fn tangent(&self) -> Result<f64> {
         let centre = [self.bend - self.pitch[1] / 2.0, self.head_plane() - self.middle[1]];
         let excess = |angle: f64| {
@@ -145,7 +145,7 @@ impl Layout {
         Ok(0.5 * (low + high))
     }
 
-    /// Point of a leg that turns around the other one between the height `turn` and the middle of the weft, `t` from 0 to 1.
+    /// Point of a leg that turns around the other leg between the height `turn` and the middle of the weft, `t` from 0 to 1.
     fn turning(&self, turn: f64, side: f64, lead: f64, t: f64) -> Vector {
         let share = smooth(t);
         let angle = FRAC_PI_2 * share;
@@ -153,8 +153,8 @@ impl Layout {
         [xi, lead * self.half_legs * cos(angle), turn + (self.middle[1] - turn) * t]
     }
 
-    /// Height where legs begin to turn around each other: a little above the lower corner of the warp, or as far below that
-    /// they keep their distance from it, if they then keep it from the weft as well.
+    /// Height at which legs begin to turn around each other: a little above the lower corner of the warp, or low enough to keep
+    /// their distance from the warp if they then keep it from the weft as well.
     fn turn(&self) -> f64 {
         let corner = |axis: usize, section: &Section| (self.pitch[axis] - section.width) / 2.0;
         let [beside_warp, beside_weft] = [corner(0, &self.warp), corner(1, &self.weft)];
@@ -184,8 +184,8 @@ impl Layout {
         if are_clear(low) == [true; 2] { low } else { first }
     }
 
-    /// Half of a loop from the top of a leg to the middle of the head, `[ξ, η, z]` with ξ from the wale outwards and η from
-    /// the course. `side` is that of the leg along x at the weft, `lead` that along y at the warp.
+    /// Half of a loop from the top of a leg to the middle of the head, `[ξ, η, z]` with ξ from the wale outwards and η from the
+    /// course. `side` is the side of the leg along x at the weft, `lead` its side along y at the warp.
     fn leg(&self, side: f64, lead: f64) -> Result<Vec<Vector>> {
         let [rho, bend, shift, pitch] = [self.half_legs, self.bend, self.shift, self.pitch[1]];
         let [warp, weft] = self.middle;
@@ -194,7 +194,7 @@ impl Layout {
         let mut path: Vec<Vector> = sweep(top - turn, top, turn, |z| [-shift, lead * rho, z]).collect();
         path.extend(sweep(turn - weft, 0.0, 1.0, |t| self.turning(turn, side, lead, t)));
         path.extend(sweep(weft - head, weft, head, |z| [side * rho, 0.0, z]));
-        // The flank of the loop: it widens from the distance of the legs to the width of the head.
+        // The flank of the loop widens from the leg spacing to the width of the head.
         let xi = |eta: f64| side * (rho + bend * smooth((eta - bend) / (pitch - bend)));
         path.extend(self.flank(head)?.into_iter().map(|[eta, z]| [xi(eta), eta, z]));
         path.extend(sweep(bend * FRAC_PI_2, 0.0, FRAC_PI_2, |angle| {
@@ -232,7 +232,7 @@ impl Layout {
         Ok(profile.into_iter().map(|[eta, z, _]| [eta, z]).collect())
     }
 
-    /// Underlap over the warp, with the rise along y spread over its length but for a ramp at either end.
+    /// Underlap over the warp: it rises along y at a constant rate, with a ramp at either end.
     fn underlap(&self) -> Vec<Vector> {
         let corner = (self.pitch[0] - self.warp.width) / 2.0 - self.shift;
         let curve = Polyline::new(self.warp.offset(self.stand_off, corner).into_iter().map(|[u, v]| [u, 0.0, v]));
@@ -270,7 +270,7 @@ impl Layout {
 }
 
 impl Path {
-    /// Arc lengths of both ends, and part, of every beam of one lap.
+    /// Arc lengths of both ends and the part of every beam of one lap.
     pub fn beams(&self, beams: usize, radius: f64) -> Vec<([f64; 2], Part)> {
         let part = |middle: f64| if middle < self.loop_length { Part::Loop } else { Part::Underlap };
         let ends = self.line.graded(beams, radius);
@@ -278,13 +278,13 @@ impl Path {
     }
 }
 
-/// Length of a curve between two of its points over their distance, less 1.
+/// Arc length between two points of a curve over their distance, less 1.
 pub fn excess(arc: f64, from: Vector, to: Vector) -> f64 {
     arc / norm(sub(to, from)) - 1.0
 }
 
-/// A thread of the stitch whose nodes start at `first`, with the part of the lap that each beam belongs to and its
-/// [`excess`]; a closed chain if it has a `wrap`.
+/// A thread of the stitch whose nodes start at `first`, with the part of the lap and the [`excess`] of each beam; a closed chain
+/// if it has a `wrap`.
 pub fn thread(stitch: &Stitch, name: String, first: usize, wrap: Option<[i32; 2]>, beams: Vec<(Part, f64)>) -> Thread {
     let (parts, excess): (Vec<Part>, Vec<f64>) = beams.into_iter().unzip();
     Thread {

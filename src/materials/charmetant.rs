@@ -1,17 +1,17 @@
 //! Transversely isotropic hyperelastic law of fibre bundles (Charmetant et al.; Eqs 2 to 7 of Zheng et al.), fibre along axis 1.
 //!
-//! With t = C − I = H + Hᵀ + HᵀH, c = 1 + t₁₁ = I₄ and g = (t₁₂, t₁₃), the Schur complement C̃ = I₂ + b,
-//! b_ab = t_ab − g_a g_b/c, carries all that happens in the cross-section: I₃/I₄ = det C̃, and (I₁I₄ − I₅)/√(I₃I₄) = tr C̃/√det C̃.
-//! The four invariants of the paper become
+//! With t = C − I = H + Hᵀ + HᵀH, c = 1 + t₁₁ = I₄ and g = (t₁₂, t₁₃), the Schur complement C̃ = I₂ + b, b_ab = t_ab − g_a g_b/c,
+//! describes the deformation of the cross-section: I₃/I₄ = det C̃, and (I₁I₄ − I₅)/√(I₃I₄) = tr C̃/√det C̃. The four invariants
+//! of the paper become
 //!
 //! - I_elong = ½ ln c,
 //! - I_comp = ¼ ln det C̃,
 //! - I_sh² = |g|²/c²,
 //! - I_dist = ½ asinh √u, with u = |dev b|²/det C̃ and dev b = ((b₂₂ − b₃₃)/2, b₂₃),
 //!
-//! none of which needs a difference of nearly equal numbers. Neither I_sh nor I_dist has a derivative at rest; their squares do,
-//! and those are what the energy holds. The exponent p < 2 of compaction makes the tangent infinite at I_comp → 0⁻: below the
-//! cap the power is continued by the parabola with the same slope.
+//! none of which needs a difference of nearly equal numbers. Neither I_sh nor I_dist is differentiable at rest; the energy
+//! contains only their squares, which are. The exponent p < 2 of compaction makes the tangent infinite at I_comp → 0⁻: below the
+//! cap a parabola with the same slope continues the power law.
 
 use super::{Material, Moduli, PARAMETERS, Tensor, add_product, jacobian};
 use crate::kernel::lane::Lane;
@@ -28,10 +28,10 @@ const K_SH: usize = 4;
 const CAP: usize = 5;
 /// Slope of dw_comp/d|I_comp| below the cap: K p cap^(p−2).
 const CAP_SLOPE: usize = 6;
-/// What makes the energy continuous at the cap: K cap^p (p/2 − 1).
+/// Constant that makes the energy continuous at the cap: K cap^p (p/2 − 1).
 const CAP_ENERGY: usize = 7;
 
-/// Smallest |I_comp| whose power is taken when the cap is off.
+/// Smallest |I_comp| in the power law when the cap is off.
 const TINY: f64 = 1e-30;
 /// Smallest det C̃: a cross-section crushed to 1 % of its area.
 const CRUSHED: f64 = 1e-4;
@@ -82,7 +82,7 @@ fn state<L: Lane>(h: &Tensor<L>) -> State<L> {
     let b33 = t33 - g3 * g3c;
     let b23 = t23 - g2 * g3c;
     let dm = b22 + b33 + b22.fma(b33, -(b23 * b23));
-    // near inversion the sum cancels; the determinant of F does not
+    // near inversion the sum suffers from cancellation; det F does not
     let j = jacobian(h);
     let det = L::select(dm.lt(L::new(-0.7)), (j * j * inv_c).max(L::new(CRUSHED)), one + dm);
     let dm = L::select(dm.lt(L::new(-0.7)), det - one, dm);
@@ -92,7 +92,7 @@ fn state<L: Lane>(h: &Tensor<L>) -> State<L> {
     State { g2, g3, inv_c, b22, b33, b23, inv_det, i_elong: half * log1p(t11), i_comp: L::new(0.25) * log1p(dm), dv, u }
 }
 
-/// |I_comp|^(p − 1), and |I_comp| kept from zero.
+/// |I_comp|^(p − 1), with |I_comp| kept from zero, and |I_comp|.
 #[inline(always)]
 fn compaction_power<L: Lane>(p: &[L; PARAMETERS], i_comp: L) -> (L, L) {
     let size = i_comp.abs();
@@ -148,7 +148,7 @@ impl Material for Charmetant {
 
     #[inline(always)]
     fn moduli<L: Lane>(p: &[L; PARAMETERS], h: &Tensor<L>) -> Moduli<L> {
-        // In the cross-section: compaction (its tangent falls with |I_comp|, hence at least the cap's) and its stress,
+        // In the cross-section: compaction (its tangent falls with |I_comp|, which counts as at least the cap) and its stress,
         // and distortion; all grow with the inverse of the smaller stretch of the section.
         let (zero, one, half) = (L::new(0.0), L::new(1.0), L::new(0.5));
         let s = state(h);
@@ -161,8 +161,8 @@ impl Material for Charmetant {
         let difference = s.dv.fma(s.dv, s.b23 * s.b23).sqrt();
         let smaller = (mean - difference).max(L::new(0.01));
         let across = (tangent + L::new(0.25) * p[K_DIST] + stressed) / smaller;
-        // Shear |g|/c is driven by the fibre and by the widest direction of the section as they are stretched now; and its
-        // stress turns with both.
+        // The shear |g|/c depends on the current stretches of the fibre and of the widest direction of the section, and its
+        // stress rotates with both.
         let g_g = s.g2.fma(s.g2, s.g3 * s.g3);
         let widest = (mean + difference + g_g * s.inv_c) * s.inv_c;
         let shear = p[K_SH] * s.inv_c * (one.max(widest) + g_g.sqrt() * s.inv_c);

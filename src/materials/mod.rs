@@ -12,8 +12,8 @@ pub type Tensor<L> = [[L; 3]; 3];
 /// Numbers that a law may keep in its row of the material table.
 pub const PARAMETERS: usize = 8;
 
-/// A hyperelastic law in the frame of the fibre (axis 1), from the displacement gradient H = F − I: forming strains from
-/// H loses nothing to cancellation at small strain.
+/// A hyperelastic law in the frame of the fibre (axis 1), from the displacement gradient H = F − I. Strains formed from H avoid
+/// cancellation at small strain.
 pub trait Material: 'static {
     /// Its WGSL twin under `shaders/`.
     const SHADER: &'static str;
@@ -26,21 +26,21 @@ pub trait Material: 'static {
     fn moduli<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> Moduli<L>;
 }
 
-/// Upper estimates of tangent stiffness by what is strained, MPa of the reference volume.
+/// Upper estimates of tangent stiffness by mode of strain, MPa of the reference volume.
 pub struct Moduli<L> {
-    /// The cross-section, per displacement gradient across the fibre of motion across it.
+    /// Strain of the cross-section: motion across the fibre that varies across it.
     pub across: L,
     /// Longitudinal shear: motion along the fibre that varies across it, and motion across it that varies along it.
     pub shear: L,
-    /// The fibre.
+    /// Stretch of the fibre.
     pub along: L,
     /// Tension of the fibre, which resists motion across it that varies along it.
     pub tension: L,
 }
 
 impl<L: Lane> Moduli<L> {
-    /// Row sum of a corner's stiffness per volume, less that of the fibre: from the sizes of the derivatives of its shape function
-    /// along each axis and across the fibre, and their sums over all corners.
+    /// Row sum of the stiffness matrix at a corner per volume, without the fibre stiffness: from the absolute derivatives of its
+    /// shape function along each axis and across the fibre, and their sums over all corners.
     #[inline(always)]
     pub fn rows(&self, [along, second, third]: [L; 3], across: L, sums: [L; 3], sum_across: L) -> L {
         // motion of the corner across the fibre, and along it
@@ -51,14 +51,14 @@ impl<L: Lane> Moduli<L> {
     }
 }
 
-/// The laws there are.
+/// The available laws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Law {
     Charmetant,
     NeoHookean,
 }
 
-/// The law a user chose, its row of the material table, and its stiffness along the fibre in MPa.
+/// The chosen law, its row of the material table, and its stiffness along the fibre in MPa.
 pub fn choose(choice: &Choice) -> (Law, [f64; PARAMETERS], f64) {
     match *choice {
         Choice::Charmetant { k_elong_mpa, k_comp_mpa, p_comp, k_dist_mpa, k_sh_mpa, compaction_cap } => (
@@ -74,7 +74,7 @@ pub fn choose(choice: &Choice) -> (Law, [f64; PARAMETERS], f64) {
     }
 }
 
-/// Shear modulus of a law at rest, MPa; of yarns the larger one, along or across the fibre.
+/// Shear modulus of a law at rest, MPa; for yarns the larger of those along and across the fibre.
 pub fn shear_modulus(choice: &Choice) -> f64 {
     match *choice {
         // b₂₃ is the shear angle γ, and the energy of small distortion K/8 γ²
@@ -94,7 +94,7 @@ pub fn jacobian<L: Lane>(h: &Tensor<L>) -> L {
     a * x - h[0][1] * y + h[0][2] * z
 }
 
-/// (I + H) S: the first from the second Piola–Kirchhoff stress.
+/// (I + H) S: the first Piola–Kirchhoff stress from the second.
 #[inline(always)]
 pub fn add_product<L: Lane>(h: &Tensor<L>, s: &Tensor<L>) -> Tensor<L> {
     let mut p = *s;

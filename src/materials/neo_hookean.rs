@@ -1,7 +1,7 @@
 //! Compressible neo-Hookean solid, w = μ/2 (tr C − 3) − μ ln J + λ/2 (ln J)², for verification scenes.
 //!
-//! At small strain both parts of μ cancel to first order. They are written without what cancels, from t = C − I = H + Hᵀ + HᵀH,
-//! which a rotation leaves as it is: det C − 1 = x = tr t + m, m = tr cof t + det t, and
+//! At small strain both μ terms cancel to first order. They are therefore written without the cancelling parts, from t = C − I =
+//! H + Hᵀ + HᵀH, which is invariant to rotation: det C − 1 = x = tr t + m, m = tr cof t + det t, and
 //!
 //! - w = μ/2 (φ(x) − m) + λ/8 ln² (1 + x), φ(x) = x − ln(1 + x),
 //! - S = (μ cof C t + λ ln J cof C)/J², symmetric to the last bit.
@@ -29,13 +29,13 @@ pub fn longitudinal(young: f64, poisson: f64) -> f64 {
     p[LAMBDA] + 2.0 * p[MU]
 }
 
-/// Smallest determinant of F that the logarithm is taken of.
+/// Smallest det F whose logarithm is taken.
 const CRUSHED: f64 = 1e-3;
-/// |x| below which φ(x) is taken from its series, and the last power there.
+/// |x| below which a series gives φ(x), and its last power.
 const SMALL: f64 = 0.05;
 const TERMS: usize = 13;
 
-/// Strain of a volume.
+/// Strain measures at a point.
 struct Strain<L> {
     t: Tensor<L>,
     /// m.

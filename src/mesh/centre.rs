@@ -1,14 +1,14 @@
-//! A scene far from the origin, brought to where its positions fit into their quanta.
+//! Centring of a scene far from the origin, so that its positions fit the range of their quanta.
 
 use super::Mesh;
 use super::vector::{Vector, add};
 use std::borrow::Cow;
 
-/// Largest coordinate of a node at the start, mm: leaves room for displacements.
+/// Largest coordinate of a node at the start, mm; it leaves room for displacements.
 pub const REACH: f64 = 250.0;
 
-/// Way by which a scene is moved before it is computed, mm: none where it lies within reach of the origin or is periodic, else
-/// from the middle of its box, to whole mm, to the origin. Whole mm are whole quanta: differences of positions stay as they are.
+/// Shift of a scene before it is computed, mm: zero if it lies within reach of the origin or is periodic, else from the middle of
+/// its bounding box, rounded to whole mm, to the origin. Whole mm are whole quanta, so differences of positions stay as they are.
 pub fn shift(mesh: &Mesh) -> Vector {
     let near = mesh.nodes.iter().flatten().all(|x| x.abs() <= REACH);
     if near || mesh.period.is_some() {
@@ -23,7 +23,7 @@ pub fn shift(mesh: &Mesh) -> Vector {
     })
 }
 
-/// The scene where it is computed.
+/// The scene at the place where it is computed.
 pub fn centred(mesh: &Mesh) -> Cow<'_, Mesh> {
     let shift = shift(mesh);
     if shift == [0.0; 3] {

@@ -1,4 +1,4 @@
-//! Room between threads and their neighbours in the reference position.
+//! Clearance between threads and their neighbours in the reference position.
 
 use super::vector::{Vector, add, between, dot, norm, scale, sub};
 use super::{Block, Mesh, Ply};
@@ -15,9 +15,9 @@ pub struct Clearance {
     pub at: Vector,
 }
 
-/// Smallest gap between any thread and the yarns of a ply, at `samples` evenly spaced points of each beam (1: its first
-/// node). Yarns are straight, so distances are measured to the polygon of their first section; what lies beyond both ends
-/// of an open yarn does not count.
+/// Smallest gap between any thread and the yarns of a ply, at `samples` evenly spaced points of each beam (1: its first node).
+/// Yarns are straight, so distances are measured to the polygon of their first section; points beyond either end of an open yarn
+/// do not count.
 pub fn thread_yarn(mesh: &Mesh, ply: Ply, samples: usize) -> Option<Clearance> {
     let outlines: Vec<Outline> = mesh.blocks.iter().filter(|b| b.ply == ply).map(|b| Outline::of(mesh, b)).collect();
     let mut best: Option<Clearance> = None;
@@ -51,7 +51,7 @@ struct Outline<'a> {
     centre: [f64; 2],
     /// Half extents of the bounding box.
     half: [f64; 2],
-    /// Where an open yarn starts and ends along the fibre.
+    /// Start and end of an open yarn along the fibre.
     ends: [f64; 2],
     points: Vec<[f64; 2]>,
 }
@@ -121,7 +121,7 @@ impl<'a> Outline<'a> {
     }
 }
 
-/// A beam, its thread, the arc length at its middle, its own length, and how many turns of its closed chain its image is ahead.
+/// A beam: its thread, the arc length at its middle, its length, and the turns of the closed chain by which its image is ahead.
 struct Segment {
     ends: [Vector; 2],
     thread: usize,
@@ -156,7 +156,7 @@ pub fn thread_thread(mesh: &Mesh, arc: f64) -> Option<Clearance> {
             }
             if a.thread == b.thread {
                 let ahead = (b.arc + f64::from(b.turns) * lengths[b.thread] - a.arc).abs();
-                // around a ring there are two ways
+                // a ring has two ways around it
                 let is_ring = mesh.threads[a.thread].wrap == Some([0, 0]);
                 let middles = if is_ring { ahead.min(lengths[a.thread] - ahead) } else { ahead };
                 if middles - 0.5 * (a.length + b.length) <= arc {

@@ -1,8 +1,9 @@
-//! Export to an Abaqus input file that CalculiX reads too: geometry, sets, orientations, sections and materials.
+//! Export to an Abaqus input file, which CalculiX also reads: geometry, sets, orientations, sections and materials.
 //!
 //! Materials are linear about rest: engineering constants of the law at small strain, with the constants of the law itself in
-//! comments for who has it as a user material. A thread is a beam with a square section that has EA and EI of the thread: it is
-//! thinner than the envelope, whose radius a contact definition needs and a comment names. CalculiX has linear beams with no round one.
+//! comments for use with a user material. A thread is a beam with a square section that has EA and EI of the thread. The section
+//! is thinner than the envelope, whose radius a contact definition needs and a comment names. CalculiX has no linear beam with a
+//! round section.
 
 use super::vector::{norm, sub};
 use super::{Block, Mesh, Ply, Seen, Thread};
@@ -25,7 +26,7 @@ pub fn write_inp(mesh: &Mesh, sets: &[NodeSet], path: &Path) -> Result<()> {
     inp(mesh, sets, &mut out).and_then(|()| out.flush()).map_err(|e| Error::file(path, e))
 }
 
-/// Numbers of nodes in the file: originals first, then copies in the order in which elements ask for them.
+/// Numbers of nodes in the file: originals first, then copies in the order in which elements use them.
 struct Numbers {
     originals: usize,
     copies: Vec<Seen>,
@@ -86,7 +87,7 @@ pub fn inp(mesh: &Mesh, sets: &[NodeSet], out: &mut dyn Write) -> io::Result<()>
     Ok(())
 }
 
-/// A set of nodes, unless it is empty.
+/// Writes a set of nodes, unless it is empty.
 fn node_set(out: &mut dyn Write, name: &str, nodes: impl Iterator<Item = usize>) -> io::Result<()> {
     let numbers: Vec<String> = nodes.map(|n| n.to_string()).collect();
     if !numbers.is_empty() {
@@ -95,12 +96,12 @@ fn node_set(out: &mut dyn Write, name: &str, nodes: impl Iterator<Item = usize>)
     numbers.chunks(16).try_for_each(|line| writeln!(out, "{}", line.join(", ")))
 }
 
-/// A name as decks have them.
+/// A name in the form that decks allow.
 fn label(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_uppercase() } else { '_' }).collect()
 }
 
-/// Sets of the elements of both plies and of the stitch.
+/// Writes sets of the elements of both plies and of the stitch.
 fn element_groups(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     let of_ply = |ply: Ply| {
         let own = mesh.blocks.iter().enumerate().filter(move |(_, block)| block.ply == ply);
@@ -154,8 +155,8 @@ fn hexahedra(block: &Block, set: &str, numbers: &mut Numbers, next: &mut usize, 
     Ok(())
 }
 
-/// The flat and the steep beams of a thread, where it has any: a first section axis must not be along its beam, so each
-/// kind needs its own.
+/// The flat and the steep beams of a thread, where it has any: the first section axis must not point along the beam, so each kind
+/// needs its own.
 fn slopes(mesh: &Mesh, thread: &Thread) -> Vec<(&'static str, Vec<usize>)> {
     let steep = |&i: &usize| {
         let [a, b] = thread.beam(i).map(|n| mesh.position(n));
@@ -187,7 +188,7 @@ fn beams(
     Ok(())
 }
 
-/// The section of a block, and its material unless another block has it already.
+/// Writes the section of a block, and its material unless another block has written it.
 fn solid_section(
     mesh: &Mesh,
     index: usize,
@@ -196,7 +197,7 @@ fn solid_section(
     out: &mut dyn Write,
 ) -> io::Result<()> {
     let [a, b, c] = block.fibre;
-    // Any second direction that is not along the fibre completes the orientation.
+    // Any second direction not along the fibre completes the orientation.
     let [d, e, f] = if c.abs() > 0.9 { [1.0, 0.0, 0.0] } else { [-b, a, 0.0] };
     let set = set("BLOCK", index);
     let own = |ply: Ply| mesh.blocks.iter().filter(move |other| other.ply == ply);
@@ -236,10 +237,10 @@ fn solid_section(
 
 /// Engineering constants at rest of the law of Charmetant et al.: E₁, E₂, E₃, ν₁₂, ν₁₃, ν₂₃, G₁₂, G₁₃, G₂₃.
 ///
-/// With small strains ε its invariants are I_elong = ε₁₁, I_comp = (ε₂₂ + ε₃₃)/2, I_sh² = γ₁₂² + γ₁₃² and I_dist² = ((ε₂₂ − ε₃₃)² +
-/// γ₂₃²)/4. Each energy is half a stiffness times its square; that of compaction is K p c^(p−2) below the cap c. Hence C₂₂ =
-/// (K_comp' + K_dist)/4 and C₂₃ = (K_comp' − K_dist)/4. Without a cap the law has no stiffness at rest, or an infinite one; 0.001
-/// stands for it then.
+/// With small strains ε its invariants are I_elong = ε₁₁, I_comp = (ε₂₂ + ε₃₃)/2, I_sh² = γ₁₂² + γ₁₃² and I_dist² = ((ε₂₂ − ε₃₃)²
+/// + γ₂₃²)/4. Each energy is half a stiffness times its square; for compaction that stiffness is K p c^(p−2) below the cap c.
+/// Hence C₂₂ = (K_comp' + K_dist)/4 and C₂₃ = (K_comp' − K_dist)/4. Without a cap the stiffness at rest is zero or infinite; a
+/// cap of 0.001 is then used.
 fn at_rest(&[elongation, compaction, exponent, distortion, shear, cap]: &[f64; 6]) -> [f64; 9] {
     let cap = if cap > 0.0 { cap } else { 1e-3 };
     let compaction = compaction * exponent * cap.powf(exponent - 2.0);
@@ -248,7 +249,7 @@ fn at_rest(&[elongation, compaction, exponent, distortion, shear, cap]: &[f64; 6
     [elongation, young, young, 0.0, 0.0, other / own, shear, shear, 0.25 * distortion]
 }
 
-/// Numbers of a line. CalculiX reads no more than twenty characters of each.
+/// The numbers of a line. CalculiX reads at most twenty characters of each.
 fn numbers(numbers: &[f64]) -> String {
     let short = |x: &f64| {
         let exact = format!("{x:?}");
@@ -257,7 +258,7 @@ fn numbers(numbers: &[f64]) -> String {
     numbers.iter().map(short).collect::<Vec<_>>().join(", ")
 }
 
-/// The sections of a thread, and its material unless another thread has it already.
+/// Writes the sections of a thread, and its material unless another thread has written it.
 fn beam_section(
     mesh: &Mesh,
     index: usize,

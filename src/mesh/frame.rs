@@ -1,4 +1,4 @@
-//! The deformed state of a mesh at one moment: what measures, files and pictures are made from.
+//! The deformed state of a mesh at one moment, the source of measures, files and pictures.
 
 use super::{Mesh, Seen};
 use crate::error::{Error, Result};
@@ -10,7 +10,7 @@ pub struct Frame {
     pub time: f64,
     /// Shear angle γ of the periodic cell, degrees.
     pub angle_deg: f64,
-    /// Largest prescribed displacement of a free scene, mm: the way of the clamp of a specimen.
+    /// Largest prescribed displacement of a free scene, mm: the displacement of a specimen's clamp.
     pub displacement_mm: f64,
     /// Macroscopic deformation gradient F̄ (in-plane part, rows first); identity for free scenes.
     pub gradient: [[f64; 2]; 2],
@@ -24,7 +24,7 @@ pub struct Frame {
     pub beam_fields: Vec<Field>,
 }
 
-/// A named field: one or three numbers an item.
+/// A named field: one or three numbers per item.
 #[derive(Debug, Clone)]
 pub struct Field {
     pub name: String,
@@ -48,7 +48,7 @@ impl Frame {
         [x + dx, y + dy, z + dz]
     }
 
-    /// Whether positions and fields have as many values as the mesh has items; the error names the first that has not.
+    /// Whether positions and fields have as many values as the mesh has items; the error names the first mismatch.
     pub fn check(&self, mesh: &Mesh) -> Result<()> {
         let sized = |name: &str, count: usize, wanted: usize| {
             if count == wanted {

@@ -1,5 +1,4 @@
-//! Whether the loops of the stitch hold each other: Gauss linking numbers of loop heads with the legs of the next loop of
-//! their wale.
+//! Interlocking of the loops of the stitch: Gauss linking numbers of loop heads with the legs of the next loop of their wale.
 
 use super::vector::{Vector, add, cross, dot, norm, scale, sub};
 use super::{Mesh, Part, Ply};
@@ -8,7 +7,7 @@ use std::f64::consts::PI;
 /// Far from every loop, mm.
 const FAR: f64 = 1e3;
 
-/// How the head of one loop links with the next loop of its wale.
+/// Linking of the head of one loop with the next loop of its wale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Link {
     /// Thread of the head.
@@ -37,12 +36,12 @@ pub fn open_heads(mesh: &Mesh) -> Vec<(usize, usize)> {
     loops.iter().filter(open).map(|head| (head.thread, head.first + head.apex)).collect()
 }
 
-/// Direction of wales: they run along the warps.
+/// Direction of the wales, which run along the warps.
 fn wale(mesh: &Mesh) -> Option<Vector> {
     mesh.blocks.iter().find(|b| b.ply == Ply::Warp).map(|b| b.fibre)
 }
 
-/// The next loop of the wale, whose legs start nearest to the apex of a head, and how far its image is away, mm.
+/// The next loop of the wale, whose legs start nearest to the apex of a head, and the shift of its image, mm.
 fn next<'a>(mesh: &Mesh, wale: Vector, loops: &'a [Loop], head: &Loop) -> Option<(&'a Loop, Vector)> {
     let apex = head.nodes[head.apex];
     let image = |l: &Loop| {
@@ -66,11 +65,11 @@ struct Loop {
     nodes: Vec<Vector>,
     /// Node furthest along the wale.
     apex: usize,
-    /// Middle between the tops of its legs.
+    /// Midpoint between the tops of its legs.
     base: Vector,
 }
 
-/// One entry per loop of a stitched fabric; where threads are cut, per whole loop whose next one is whole too.
+/// One entry per loop of a stitched fabric; where threads are cut, per whole loop whose next loop is whole too.
 pub fn links(mesh: &Mesh) -> Vec<Link> {
     let Some(wale) = wale(mesh) else { return Vec::new() };
     let loops = loops(mesh, wale);
@@ -119,7 +118,7 @@ fn loops(mesh: &Mesh, wale: Vector) -> Vec<Loop> {
     loops
 }
 
-/// Closes an open leg by a way around the fabric: down from its end, far along the wale, up and back to its start.
+/// Closes an open leg by a detour around the fabric: down from its end, far along the wale, up and back to its start.
 fn detour(leg: &[Vector], far: Vector) -> Vec<Vector> {
     let [start, end] = [leg[0], leg[leg.len() - 1]];
     let mut closed = leg.to_vec();
@@ -132,8 +131,8 @@ fn detour(leg: &[Vector], far: Vector) -> Vec<Vector> {
     closed
 }
 
-/// Linking number of two closed polygons: the signed solid angles under which the segments of one see those of the
-/// other, added up and divided by 4π. Exact up to rounding.
+/// Linking number of two closed polygons: the sum of the signed solid angles that pairs of their segments span, divided by 4π.
+/// Exact up to rounding.
 pub fn linking(a: &[Vector], b: &[Vector]) -> f64 {
     let mut total = 0.0;
     for (i, &p) in a.iter().enumerate() {

@@ -27,7 +27,7 @@ pub const CORNER_SIGNS: [[f64; 3]; 8] = [
     [-1.0, 1.0, 1.0],
 ];
 
-/// Everything that is discretised, in its reference position. Lengths in mm.
+/// All discretised bodies in their reference position. Lengths in mm.
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
     /// Reference positions, mm.
@@ -62,14 +62,14 @@ pub struct Block {
     pub slices: usize,
     pub columns: usize,
     pub layers: usize,
-    /// For a yarn that closes on itself through the periodic cell: the image `[i, j]`, in periods, of the slice behind the last.
+    /// For a yarn that closes on itself through the periodic cell: the image `[i, j]`, in periods, of the slice after the last.
     pub wrap: Option<[i32; 2]>,
     /// Unit fibre direction.
     pub fibre: [f64; 3],
-    /// Density, tonne/mm³, such that the areal mass is met on this mesh.
+    /// Density, tonne/mm³, chosen to give the areal mass on this mesh.
     pub density: f64,
     pub material: Material,
-    /// Velocity at the start, mm/s.
+    /// Initial velocity, mm/s.
     pub velocity: [f64; 3],
 }
 
@@ -95,11 +95,11 @@ pub struct Thread {
     pub linear_density: f64,
     /// Thermal strain at full pre-tension.
     pub thermal_strain: f64,
-    /// Velocity at the start, mm/s.
+    /// Initial velocity, mm/s.
     pub velocity: [f64; 3],
     /// Which part of the lap each beam belongs to (`beam i` joins nodes i and i + 1).
     pub parts: Vec<Part>,
-    /// Length of the curve that each beam is a chord of, over the length of the chord, less 1.
+    /// Arc length that each beam spans as a chord, over the length of the chord, less 1.
     pub excess: Vec<f64>,
 }
 
@@ -112,7 +112,7 @@ pub enum Part {
     Free,
 }
 
-/// A node and the periodic image in which it is seen, in periods along x and y.
+/// A node and one of its periodic images, in periods along x and y.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Seen {
     pub node: usize,
@@ -127,8 +127,9 @@ impl Mesh {
         [x + f64::from(seen.image[0]) * lx, y + f64::from(seen.image[1]) * ly, z]
     }
 
-    /// Arc, mm, within which points of one thread do not touch each other: half a turn of the tightest loop that a thread can make,
-    /// with its radius, whose inside folds. Points further apart have room for both radii in any wider bend.
+    /// Arc, mm, within which points of one thread make no contact with each other: half a turn of the tightest bend of a thread,
+    /// whose radius is that of the thread and whose inside folds. Points further apart have room for both radii in any wider
+    /// bend.
     pub fn self_arc(&self) -> f64 {
         std::f64::consts::PI * self.threads.iter().map(|t| t.radius).fold(0.0, f64::max)
     }

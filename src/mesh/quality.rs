@@ -1,4 +1,4 @@
-//! What a mesh is worth before anything moves: shape of hexahedra, volumes, lengths, masses.
+//! Quality and sizes of an undeformed mesh: shape of hexahedra, volumes, lengths, masses.
 
 use super::vector::{Vector, cross, dot, norm, scale, sub, unit};
 use super::{Block, CORNER_SIGNS, Mesh, Part, Ply, Thread};
@@ -23,7 +23,7 @@ fn corner_jacobian(hex: &[Vector; 8]) -> f64 {
     (0..8).map(corner).map(|[a, b, c]| dot(cross(a, b), c)).fold(f64::INFINITY, f64::min)
 }
 
-/// Volume of a block in mm³, exact for trilinear hexahedra (2 × 2 × 2 points).
+/// Volume of a block in mm³, exact for trilinear hexahedra (2 × 2 × 2 Gauss points).
 pub fn volume(mesh: &Mesh, block: &Block) -> f64 {
     elements(mesh, block).map(|hex| hex_volume(&hex)).sum()
 }

@@ -1,4 +1,4 @@
-//! The printed account of a mesh.
+//! The printed summary of a mesh.
 
 use super::clearance::{Clearance, thread_thread, thread_yarn};
 use super::quality::{ArealMass, areal_mass, length, scaled_jacobian};
@@ -8,7 +8,7 @@ use std::fmt;
 /// Points along a beam at which its distance to yarns is measured.
 const SAMPLES: usize = 8;
 
-/// Counts, sizes and room of a mesh in its reference position.
+/// Counts, sizes and clearances of a mesh in its reference position.
 #[derive(Debug, Clone)]
 pub struct Report {
     pub title: String,
@@ -23,7 +23,7 @@ pub struct Report {
     pub period: Option<[f64; 2]>,
     /// Length of all threads, of their loops and of their underlaps, mm.
     pub lengths: [f64; 3],
-    /// Number of loops whose next one is whole: all laps of a cell.
+    /// Number of loops whose next loop is whole: all laps of a cell.
     pub laps: usize,
     pub areal_mass: Option<ArealMass>,
     /// Smallest scaled Jacobian and its block.

@@ -1,5 +1,5 @@
-//! The outer surface of a block: along its fibres a ring of fibre lines around the section, with quadrilaterals between
-//! neighbouring lines and slices; of an open block also the caps at both ends. So the surface is closed, or goes on for ever.
+//! The outer surface of a block: a ring of fibre lines around the section, with quadrilaterals between neighbouring lines and
+//! slices, and for an open block the caps at both ends. The surface is therefore closed, or infinite along the fibre.
 
 use super::vector::{add, cross, norm, scale, sub};
 use super::{Block, Mesh, Seen};
@@ -74,7 +74,7 @@ impl<'a> Surface<'a> {
         [self.node(r, slice), self.node(next, slice), self.node(next, slice + 1), self.node(r, slice + 1)]
     }
 
-    /// Corners of the faces that close an open block at both ends, counter-clockwise seen from outside; none of a closed one.
+    /// Corners of the faces that close an open block at both ends, counter-clockwise seen from outside; none for a closed block.
     pub fn caps(&self) -> Vec<[Seen; 4]> {
         if self.block.wrap.is_some() {
             return Vec::new();
@@ -93,8 +93,8 @@ impl<'a> Surface<'a> {
         along.chain(self.caps()).collect()
     }
 
-    /// Share of the surface along the fibres that belongs to each node in mm², lines around the ring first, stations fastest: the integral
-    /// of the bilinear shape functions (2 × 2 points).
+    /// Tributary area of each node on the surface along the fibres, mm², lines around the ring first, stations fastest: the
+    /// integral of the bilinear shape functions (2 × 2 Gauss points).
     pub fn tributary_areas(&self, mesh: &Mesh) -> Vec<f64> {
         let stations = self.block.stations();
         let mut areas = vec![0.0; self.ring() * stations];
@@ -112,8 +112,8 @@ impl<'a> Surface<'a> {
     }
 }
 
-/// Which of its edges (from a corner to the next one) and of its corners each face of a closed surface owns, such that every one
-/// is owned once: by the first face that has it.
+/// The edges (from a corner to the next one) and corners that each face of a closed surface owns. Every edge and corner is owned
+/// once, by the first face that has it.
 pub fn owned(faces: &[[Seen; 4]]) -> Vec<[[bool; 4]; 2]> {
     let (mut edges, mut corners) = (BTreeSet::new(), BTreeSet::new());
     let owned = faces.iter().map(|face| {

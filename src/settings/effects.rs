@@ -1,4 +1,4 @@
-//! The effects of a scene. One that is absent leaves no buffer, no stage and no work.
+//! The effects of a scene. An absent effect leaves no buffer, no stage and no work.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,12 +13,14 @@ pub struct Effects {
     pub bending: bool,
     /// Damping of velocities. `null` turns it off.
     pub damping: Option<Damping>,
-    /// Selective mass scaling along fibres and threads: lifts the limit that their axial stiffness sets on the time
-    /// step without resisting any rigid motion. `null` turns it off.
+    /// Selective mass scaling along fibres and threads. It raises the time-step limit set by their axial stiffness and adds no
+    /// inertia to rigid motion. `null` turns it off.
     pub fibre_lines: Option<FibreLines>,
-    /// Nodal mass added only where and while contact or crushed elements would limit the time step. `null` turns it off.
+    /// Contact-aware mass: nodal mass added only where and while contact or crushed elements would limit the time step. `null`
+    /// turns it off.
     pub contact_mass: Option<ContactMass>,
-    /// Floor on nodal mass, as a share of the body's mean nodal mass: light nodes at truncated edges and short beams. 0 turns it off. Default 0.5.
+    /// Minimum nodal mass (mass floor), as a share of the body's mean nodal mass. It applies to light nodes at truncated edges
+    /// and on short beams. 0 turns it off. Default 0.5.
     #[schemars(range(min = 0, max = 1))]
     pub mass_floor: f64,
     /// Gravity, mm/s². `null` (the default) turns it off.
@@ -50,32 +52,33 @@ pub struct Contact {
     pub yarn_yarn: bool,
     /// Threads against threads. Default true.
     pub thread_thread: bool,
-    /// Penalty of a thread per length, N/mm². Default 140 (30 N/mm at a node of 0.22 mm).
+    /// Penalty stiffness of a thread per length, N/mm². Default 140 (30 N/mm at a node with a tributary length of 0.22 mm).
     #[schemars(range(min = 1e-6, max = 1e9))]
     pub thread_penalty_n_mm2: f64,
-    /// Penalty of a yarn surface per area, N/mm³. Default 65 (5 N/mm at a node of 0.078 mm²).
+    /// Penalty stiffness of a yarn surface per area, N/mm³. Default 65 (5 N/mm at a node with a tributary area of 0.078 mm²).
     #[schemars(range(min = 1e-6, max = 1e9))]
     pub yarn_penalty_n_mm3: f64,
-    /// Penalty of threads on threads per length of contact, N/mm². Default 660. Threads that cross at right angles are pressed
-    /// together as by Hertz with a contact modulus E* of twice that, in MPa: threads of 0.1 mm by 3 µm with 0.1 N.
+    /// Penalty stiffness between threads per length of contact, N/mm². Default 660. Threads that cross at right angles then
+    /// follow Hertz contact with a contact modulus E* of twice this number, in MPa: 0.1 N presses threads of 0.1 mm radius
+    /// together by 3 µm.
     #[schemars(range(min = 1e-6, max = 1e9))]
     pub thread_thread_penalty_n_mm2: f64,
-    /// Stiffness of the ties that hold cut threads at yarns, N/mm. Default 30, as of a node of a thread on a yarn.
+    /// Stiffness of the ties between cut threads and yarns, N/mm. Default 30, as for a thread node on a yarn.
     #[schemars(range(min = 1e-6, max = 1e9))]
     pub tie_n_mm: f64,
     /// Coulomb friction with true stick. The coefficient belongs to the fabric. Default true.
     pub friction: bool,
-    /// Tangential over normal penalty, above 0 to 1. Default 0.5.
+    /// Ratio of tangential to normal penalty stiffness, above 0 to 1. Default 0.5.
     #[schemars(range(min = 0.001, max = 1))]
     pub tangential_ratio: f64,
-    /// Damping of the normal approach, as a share of critical. Default 0.1.
+    /// Damping of the normal approach, as a share of critical damping. Default 0.1.
     #[schemars(range(min = 0, max = 1))]
     pub damping_ratio: f64,
-    /// Distance beyond touching at which pairs become candidates, mm. Default 0.12.
+    /// Contact skin (Verlet skin): gap below which a pair becomes a contact candidate, mm. Default 0.12.
     #[schemars(range(min = 1e-4, max = 5))]
     pub skin_mm: f64,
-    /// Contact radius of threads at the start of pre-tension over the full radius, above 0 to 1; it grows over the first
-    /// half of pre-tension. Below 1 for threads that start inside a yarn. Default 1.
+    /// Contact radius of threads at the start of pre-tension over the full radius, above 0 to 1. The radius grows to full size
+    /// over the first half of pre-tension. Use a value below 1 for threads that start inside a yarn. Default 1.
     #[schemars(range(min = 0.05, max = 1))]
     pub initial_radius_ratio: f64,
 }
@@ -109,8 +112,8 @@ pub struct Damping {
     /// Rate for threads during pretension and settle steps, 1/s. Default 20000.
     #[schemars(range(min = 0, max = 1e7))]
     pub thread_settle_rate_per_s: f64,
-    /// Rate for every node during move steps, 1/s: there the fabric moves as a whole through the medium at rest that this
-    /// damping stands for. `null` (the default) takes `rate_per_s`.
+    /// Rate for every node during move steps, 1/s. There the fabric moves as a whole, and the damping acts like a surrounding
+    /// medium at rest. `null` (the default) takes `rate_per_s`.
     #[schemars(range(min = 0, max = 1e7))]
     pub move_rate_per_s: Option<f64>,
 }
@@ -128,7 +131,7 @@ pub struct FibreLines {
     /// Strength β of the added inertia β dt² K; at least 0.25. Default 0.5.
     #[schemars(range(min = 0.25, max = 100))]
     pub beta: f64,
-    /// Also along threads. Default true.
+    /// Whether threads are scaled as well. Default true.
     pub threads: bool,
 }
 
@@ -142,14 +145,16 @@ impl Default for FibreLines {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactMass {
-    /// Factor on the mass dt²/4·K that contact at a node calls for: with 1 a contact oscillates at the limit of stability, where one that opens and
-    /// closes gains energy. Default 2.
+    /// Factor on the mass dt²/4·K that a contact of stiffness K requires at a node. With 1, contact oscillates at the stability
+    /// limit and gains energy when it opens and closes. Default 2.
     #[schemars(range(min = 0, max = 100))]
     pub factor: f64,
-    /// Share of the added mass that remains after each step once contact is lost, 0 to 1: mass that comes and goes with contact gains energy. Default 0.999.
+    /// Share of the added mass that remains after each step once contact is lost, 0 to 1. Mass that comes and goes with contact
+    /// would add energy. Default 0.999.
     #[schemars(range(min = 0, max = 1))]
     pub memory: f64,
-    /// Least limit of the time step, s: nodes whose elements alone would call for a shorter one are made heavier, in contact or not. Default 0: none.
+    /// Lower bound on the time-step limit, s. Nodes whose elements alone would require a shorter step are made heavier, in
+    /// contact or not. Default 0: no bound.
     #[schemars(range(min = 0, max = 1e-3))]
     pub least_limit_s: f64,
 }

@@ -1,16 +1,16 @@
-//! Integration in time and over hexahedra, and the limits at which a run stops.
+//! Time integration, integration over hexahedra, and the limits at which a run stops.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Integration in time, and over hexahedra.
+/// Time integration, and integration over hexahedra.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Integration {
-    /// Time step: a fixed number of s, or `null` for the estimate times `safety`. Default null.
+    /// Fixed time step, s, or `null` for the estimated limit times `safety`. Default null.
     #[schemars(range(min = 1e-12, max = 0.001))]
     pub dt_s: Option<f64>,
-    /// Largest time step the estimate may reach, s. Default 5e-7.
+    /// Upper bound on a time step that follows the estimate, s. Default 5e-7.
     #[schemars(range(min = 1e-12, max = 0.001))]
     pub dt_max_s: f64,
     /// Factor on the estimated limit, above 0 to 1. Default 0.9.
@@ -18,10 +18,10 @@ pub struct Integration {
     pub safety: f64,
     /// `f32` or `f64`. Default f32.
     pub precision: Precision,
-    /// How stress is integrated over a hexahedron. Default full.
+    /// Integration of stress over a hexahedron. Default full.
     pub hexahedra: Hexahedra,
-    /// Stiffness of the modes that the one point of `reduced` hexahedra does not see, over what the shear modulus of the yarn
-    /// would give them with full integration. Near 0 yarns fold into these modes; they stiffen as it grows. `full` takes no notice. Default 1.
+    /// Hourglass stiffness of `reduced` hexahedra, relative to the stiffness that full integration with the shear modulus of the
+    /// yarn gives. Near 0, yarns fold into hourglass modes; higher values stiffen the yarns. `full` ignores it. Default 1.
     #[schemars(range(min = 0, max = 1000))]
     pub hourglass: f64,
     /// Relative error of the energy balance at which the run stops. Default 0.1.
@@ -30,13 +30,13 @@ pub struct Integration {
     /// Penetration at which the run stops, as a share of the thread radius (threads) or yarn thickness (yarns). Default 0.5.
     #[schemars(range(min = 0.01, max = 100))]
     pub penetration_tolerance: f64,
-    /// How often a run that a guard stops goes back to an earlier state, 1000 steps or more before where there are so many, and
-    /// goes on from there with half the time step. With 0 the guard stops it. Default 0.
+    /// Maximum number of rollbacks. When a guard trips, the run returns to an earlier state, 1000 steps or more back if there are
+    /// as many, and continues with half the time step. With 0 the guard stops the run. Default 0.
     #[schemars(range(min = 0, max = 20))]
     pub retries: usize,
-    /// Largest displacement of nodes at the start along each axis, mm: measures how far runs scatter by chance. Every body moves by
-    /// a smooth pattern of its own that strains no fibres: yarns across their fibres, threads in all directions, differently from
-    /// lap to lap, prescribed nodes not at all. The negative number mirrors the pattern. Default 0.
+    /// Amplitude of an initial perturbation of the nodes along each axis, mm. It shows how far results scatter by chance. Every
+    /// body has its own smooth pattern that strains no fibres: yarns move across their fibres, threads in all directions and
+    /// differently from lap to lap, prescribed nodes not at all. A negative number mirrors the pattern. Default 0.
     #[schemars(range(min = -0.01, max = 0.01))]
     pub perturbation_mm: f64,
 }
@@ -78,10 +78,10 @@ pub enum Precision {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Hexahedra {
-    /// Eight points.
+    /// Eight Gauss points.
     #[default]
     Full,
-    /// One point, with hourglass control: cheaper steps, but shorter ones where edges of hexahedra turn away from their mean fibre,
-    /// and layers of hexahedra without the stiffness of their fibres against bending.
+    /// One Gauss point, with hourglass control. Steps are cheaper, but shorter where edges of hexahedra turn away from their mean
+    /// fibre direction, and layers of hexahedra lack the bending stiffness of their fibres.
     Reduced,
 }

@@ -24,8 +24,8 @@ pub enum Material {
         /// Longitudinal shear stiffness, MPa. Paper: 2.2.
         #[schemars(range(min = 0, max = 1e6))]
         k_sh_mpa: f64,
-        /// Compaction |I_comp| below which the power is replaced by a parabola, since its tangent is infinite at
-        /// zero for exponents below 2. 0 turns it off. Default 1e-3.
+        /// Compaction |I_comp| below which a parabola replaces the power law, whose tangent is infinite at zero for exponents
+        /// below 2. 0 turns it off. Default 1e-3.
         #[serde(default = "compaction_cap")]
         #[schemars(range(min = 0, max = 0.1))]
         compaction_cap: f64,

@@ -1,5 +1,5 @@
-//! What a user chooses about the physics and its numerics: plain structs, which the solver reads and which are a part of a case as they
-//! are. Each has its JSON form (serde), and its ranges, units and defaults in the schema (schemars).
+//! Settings of physics and numerics: plain structs that the solver reads and that a case contains unchanged. Each has a JSON form
+//! (serde), and ranges, units and defaults in the schema (schemars).
 
 pub mod effects;
 pub mod integration;

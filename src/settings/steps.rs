@@ -1,4 +1,4 @@
-//! Load steps, in the order in which they are run.
+//! Load steps, in the order in which they run.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,26 +7,26 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Step {
-    /// Nothing changes; the threads' settling damping acts.
+    /// The load stays constant; threads have their settling damping.
     Settle {
         /// Duration, s.
         #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,
     },
-    /// The stitch tightens to its thermal strain; contact radii grow to full size over the first half.
+    /// The thermal strain tightens the stitch; contact radii grow to full size over the first half of the step.
     Pretension {
         /// Duration, s.
         #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,
     },
-    /// Nothing changes.
+    /// The load stays constant.
     Hold {
         /// Duration, s.
         #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,
     },
-    /// Trellis shear of a periodic cell to `angle_deg`, from the angle before: F̄ = [[cos γ/2, sin γ/2], [sin γ/2, cos γ/2]], its
-    /// columns times the stretches of wefts and warps.
+    /// Trellis shear of a periodic cell from its current angle to `angle_deg`. The deformation gradient is F̄ = [[cos γ/2, sin
+    /// γ/2], [sin γ/2, cos γ/2]], its columns multiplied by the stretches of wefts and warps.
     Shear {
         /// Shear angle at the end, degrees, −80 to 80.
         #[schemars(range(min = -80, max = 80))]
@@ -35,8 +35,8 @@ pub enum Step {
         #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,
     },
-    /// How long the fibres of a periodic cell are, from here on: over the step the cell goes from how it is to how it shall be, and
-    /// there it stays in the steps behind. Before the first such step both directions are held at their length.
+    /// Stretch or membrane force of a periodic cell along its fibres. The cell reaches the given condition over the step and
+    /// keeps it in later steps. Before the first such step both directions are held at their initial length.
     Stretch {
         /// Along the warps, y. Default held.
         #[serde(default)]
@@ -48,8 +48,8 @@ pub enum Step {
         #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,
     },
-    /// The prescribed displacements of a specimen's clamp, or of the conditions of an inline mesh, go on to a share of their full
-    /// value.
+    /// The prescribed displacements of a specimen's clamp, or of the conditions of an inline mesh, change to a share of their
+    /// full value.
     Move {
         /// Share of the full value at the end, −1 to 1. Default 1.
         #[serde(default = "whole")]
@@ -61,19 +61,19 @@ pub enum Step {
     },
 }
 
-/// What holds a periodic cell along one of its fibre directions.
+/// Condition on a periodic cell along one fibre direction.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Along {
-    /// It stays as long as it is.
+    /// The length stays as it is.
     #[default]
     Held,
-    /// It is as long as in a cell that is pulled at one corner while the two beside it are free: the membrane force along the
-    /// fibres is F_nor (1 + sin γ).
+    /// The length follows that of a cell pulled at one corner while the two adjacent corners are free: the membrane force along
+    /// the fibres is F_nor (1 + sin γ).
     CornerDriven,
-    /// It is stretched to this length, over the one at the start.
+    /// This stretch, current over initial length.
     To(#[schemars(range(min = 0.8, max = 1.25))] f64),
-    /// It has this membrane force, N per mm across the fibres; 0 lets it free.
+    /// This membrane force, N per mm across the fibres; 0 leaves the direction free.
     ForceNPerMm(#[schemars(range(min = -1000, max = 1000))] f64),
 }
 
@@ -82,7 +82,7 @@ fn whole() -> f64 {
 }
 
 impl Step {
-    /// Duration in s.
+    /// Duration, s.
     pub fn time(&self) -> f64 {
         match *self {
             Step::Settle { time_s }
@@ -94,7 +94,7 @@ impl Step {
         }
     }
 
-    /// Duration in s, to be changed.
+    /// Mutable duration, s.
     pub fn time_mut(&mut self) -> &mut f64 {
         match self {
             Step::Settle { time_s }
@@ -106,7 +106,7 @@ impl Step {
         }
     }
 
-    /// Name as the user writes it.
+    /// Name of the step in a case.
     pub fn name(&self) -> &'static str {
         match self {
             Step::Settle { .. } => "settle",

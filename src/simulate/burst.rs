@@ -1,4 +1,4 @@
-//! A burst: some steps in one go, then a look at the distance travelled, and a contact search if the skin is used up.
+//! A burst: several steps in one go, then a look at the distance travelled, and a contact search if the skin is used up.
 
 use super::look::Looked;
 use super::{AFFINE_REACH, BURST, CALM, FARTHEST, SPEED_MARGIN, Simulation, WINDOW, largest};
@@ -9,7 +9,7 @@ use crate::kernel::buffer::Initial;
 use crate::kernel::row::Row;
 
 impl Simulation {
-    /// Some steps, then a search if the skin is used up. If the last step is looked at, returns its totals.
+    /// Runs some steps, then a search if the skin is used up. If `looks`, returns the totals of the last step.
     pub(super) fn burst(&mut self, steps: u64, looks: bool) -> Result<Option<Looked>> {
         self.hold();
         let mut rows = Vec::with_capacity(steps as usize);
@@ -62,7 +62,7 @@ impl Simulation {
         Ok(looked)
     }
 
-    /// A step with its totals in the middle and after it.
+    /// Runs a step; returns its totals in the middle and after it.
     pub(super) fn looked_at_step(&mut self, row: Row<f64>) -> Result<Looked> {
         self.backend.run(&self.model.plan.step[..self.model.forces], &[row]);
         let middle = self.diagnose(row)?;
@@ -73,7 +73,7 @@ impl Simulation {
         Ok(Looked { middle, after })
     }
 
-    /// Lets prescribed motion act from its time on, by the masks of its nodes.
+    /// Activates each prescribed motion when its time comes, by the masks of its nodes.
     pub(super) fn hold(&mut self) {
         let passed = self.schedule.phases().iter().take_while(|phase| self.time >= phase.end * (1.0 - 1e-12)).count();
         let acting = if self.model.acts_after.iter().any(|after| *after > passed) { passed } else { usize::MAX };

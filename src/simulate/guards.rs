@@ -1,4 +1,4 @@
-//! Guards: each names the cause, where it was, its size, and what to change.
+//! Guards: each message names the cause, its place and size, and what to change.
 
 use super::{Simulation, WINDOW};
 use crate::contact::candidates::{self, CARRIER};
@@ -8,11 +8,11 @@ use crate::kernel::buffer::Buffer;
 use crate::kernel::position::MOST_MM;
 use crate::settings::integration::Precision;
 
-/// A step that is longer than the estimated limit by this factor is taken for unstable: the estimate is a bound from below, and
-/// measured limits were up to 2.3 times as large.
+/// A step longer than the estimated limit by this factor counts as unstable: the estimate is a lower bound, and measured limits
+/// were up to 2.3 times as large.
 const SURELY_UNSTABLE: f64 = 3.0;
 
-/// Steps from a half of the tolerance of the energy balance to all of it that an unstable step needs at most.
+/// Most steps in which an instability takes the energy balance from half its tolerance to all of it.
 const EXPLODED: u64 = 2 * WINDOW;
 
 impl Simulation {
@@ -64,13 +64,14 @@ impl Simulation {
         self.guard_penetration("raise the contact penalties or load more slowly")
     }
 
-    /// Whether the energy balance has gone off slowly, as by rounding, rather than exploded. A step that is longer than its limit by a
-    /// ten-thousandth multiplies an energy by 1.06 with every step, so what needs more than two windows to double is no instability.
+    /// Whether the error of the energy balance has grown slowly, as by rounding, rather than exploded. A time step 1e-4 above its
+    /// limit multiplies the energy by 1.06 in every step, so an error that needs more than two windows to double is no
+    /// instability.
     fn drifts(&self) -> bool {
         self.half_off.is_some_and(|since| self.step > since + EXPLODED)
     }
 
-    /// Stops a scene whose bodies are too deep inside each other, with what to do about it.
+    /// Stops a scene whose bodies penetrate each other too deeply; `advice` says what to do.
     fn guard_penetration(&self, advice: &str) -> Result<()> {
         let h = &self.health;
         let allowed = self.scene.integration.penetration_tolerance;
@@ -90,14 +91,14 @@ impl Simulation {
         Ok(())
     }
 
-    /// Stops a scene whose bodies overlap as they are given.
+    /// Stops a scene whose bodies overlap at the start.
     pub(super) fn guard_overlap(&self) -> Result<()> {
         self.guard_penetration(
             "they overlap at the start: move them apart, or let threads grow in pre-tension by effects.contact.initial_radius_ratio",
         )
     }
 
-    /// The contact of a kind (as in [`Health::penetration`](super::Health)) whose force is largest for its stiffness; `None` if
+    /// The contact of a kind (as in [`Health::penetration`](super::Health)) with the largest force over stiffness; `None` if
     /// nothing touches any more.
     fn deepest(&self, kind: usize) -> Option<String> {
         let b = &self.model.buffers;
@@ -121,10 +122,10 @@ impl Simulation {
         Some(format!("node {node} ({}) in {body}", self.node_owner(node)))
     }
 
-    /// The beam or the node of a yarn with most candidates for contact.
+    /// The beam or yarn node with the most contact candidates.
     pub(super) fn most_crowded(&self) -> Option<String> {
         let b = &self.model.buffers;
-        // the first item with most of those with `row` entries
+        // the first item with the most of its `row` entries in use
         let most = |entries: Buffer, before: usize, row: usize| {
             let entries = self.backend.uints(entries);
             let count = |item: &[u32]| item[before..].iter().filter(|entry| **entry != EMPTY).count();
@@ -145,7 +146,7 @@ impl Simulation {
         crowded.max_by_key(|(count, _)| *count).map(|(_, what)| what)
     }
 
-    /// Stops a step that the user fixed and that cannot be stable; one that follows the estimate shortens by itself.
+    /// Stops a run whose fixed time step cannot be stable; a step that follows the estimate shortens by itself.
     pub(super) fn guard_step(&self) -> Result<()> {
         let limit = self.health.dt_limit;
         match self.scene.integration.dt_s {
@@ -209,13 +210,13 @@ impl Simulation {
         Ok(())
     }
 
-    /// The fastest node, and its speed against the macroscopic motion, mm/s.
+    /// The fastest node, and its speed relative to the macroscopic motion, mm/s.
     fn fastest(&self) -> (usize, f64) {
         let speeds = self.velocities().into_iter().map(|v| v.iter().map(|c| c * c).sum::<f64>().sqrt());
         speeds.enumerate().fold((0, 0.0), |best, now| if now.1 > best.1 { now } else { best })
     }
 
-    /// The node with the largest displacement along an axis, and that, mm.
+    /// The node with the largest displacement component, and its size, mm.
     fn furthest(&self) -> Option<(usize, f64)> {
         let reach = |w: [f64; 3]| w.iter().fold(0.0, |most: f64, c| most.max(c.abs()));
         self.fluctuations().into_iter().map(reach).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))

@@ -1,4 +1,4 @@
-//! The energy ledger: what is stored now, and what has been put in and lost since the start.
+//! The energy balance: energy stored now, and work put in and lost since the start.
 
 use super::{Simulation, StressMean, WINDOW};
 use crate::contact::{status, sums};
@@ -15,16 +15,16 @@ pub struct Energies {
     pub compaction: f64,
     pub distortion: f64,
     pub shear: f64,
-    /// Of the modes that hexahedra with one integration point do not see; `None` with eight points.
+    /// Hourglass energy of hexahedra with one Gauss point; `None` with eight points.
     pub hourglass: Option<f64>,
-    /// Of threads.
+    /// Strain energy of threads.
     pub axial: f64,
     pub bending: f64,
     /// Elastic energy of contact, normal and tangential, and of ties.
     pub contact: f64,
-    /// ½ Σ m v² of the unknown: the fluctuation velocity in a periodic cell.
+    /// ½ Σ m v² of the solved velocity, in a periodic cell that of the fluctuation.
     pub kinetic: f64,
-    /// ½ Σ m v² of the total velocity, seen from the centre of mass.
+    /// ½ Σ m v² of the total velocity, relative to the centre of mass.
     pub kinetic_total: f64,
     /// Work lost to friction, to contact damping, and to damping.
     pub friction: f64,
@@ -89,7 +89,8 @@ impl Energies {
 }
 
 impl Simulation {
-    /// Elastic energy of bodies that overlap at the start: the contact stages once, over no time, without effect.
+    /// Elastic energy of bodies that overlap at the start: runs the contact stages once, over no time, without changing the
+    /// state.
     pub(super) fn contact_at_rest(&mut self) -> Result<f64> {
         let b = self.model.buffers.clone();
         let (Some(force), Some(stiffness)) = (b.contact_force, b.contact_stiffness) else { return Ok(0.0) };
@@ -114,8 +115,8 @@ impl Simulation {
         Ok(self.model.totals.contact.iter().map(|sums| sums.of(&totals, sums::SUM_ENERGY)).sum())
     }
 
-    /// Energy of threads that are not at rest as they are generated or start aside of that: their stages once, before the first
-    /// step.
+    /// Runs the thread stages once before the first step, for the energy of threads that are not stress-free as generated or
+    /// perturbed.
     pub(super) fn threads_at_rest(&mut self) {
         let b = &self.model.buffers;
         let results = [b.beam_tension, b.bend_energy];
@@ -125,7 +126,7 @@ impl Simulation {
         self.backend.run(&stages, &[row]);
     }
 
-    /// Adds the work that kernels summed since the last look: that of forces, and that of motion up to the middle of the last step.
+    /// Adds the work that kernels summed since the last look: force work, and motion work up to the middle of the last step.
     pub(super) fn add_work(&mut self, totals: &[f64], after: &[f64]) {
         let places = self.model.totals.clone();
         let only = |sums: Option<Sums>, totals: &[f64]| sums.map_or(0.0, |sums| sums.of(totals, 0));
@@ -147,7 +148,7 @@ impl Simulation {
         e.thermal += only(places.thermal, totals);
     }
 
-    /// Adds what contact summed since the last look.
+    /// Adds the energy, losses and work of contact since the last look.
     pub(super) fn add_contact(&mut self, totals: &[f64]) {
         self.energies.contact = self.model.totals.ties.map_or(0.0, |ties| ties.of(totals, 0));
         for sums in &self.model.totals.contact {
@@ -173,7 +174,7 @@ impl Simulation {
         };
         let sum = [0, 1, 2].map(|i| [0, 1, 2].map(|j| total(i, j)));
         let mean = [0, 1].map(|i| [0, 1].map(|j| sum[i][j] / steps as f64));
-        // of the product of stretch and direction, what turns and what lengthens
+        // the increment of stretch × direction splits into a rotation and a stretch
         let times = [from.max(0.0), to];
         let ([old, new], [was, is]) =
             (times.map(|t| trellis(self.schedule.load(t).angle)), times.map(|t| self.stretch.at(t)));
@@ -200,7 +201,8 @@ impl Simulation {
         (steps > 0).then(|| sum.map(|row| row.map(|x| x / steps as f64)))
     }
 
-    /// Replaces the energies that belong to the present state, with the mean of the kinetic energy then and after the last step.
+    /// Replaces the energies of the present state; kinetic energy is the mean of its values before and after the last step's
+    /// motion.
     pub(super) fn set_state(&mut self, totals: &[f64], after: &[f64]) {
         let places = &self.model.totals;
         let only = |sums: Option<Sums>| sums.map_or(0.0, |sums| sums.of(totals, 0));

@@ -1,8 +1,9 @@
-//! The limit of the time step as it is: 2/ω of the fastest oscillation of the whole scene about its present state, by power
-//! iteration. Stiffness comes from differences of all forces, with every contact held by friction; the mass matrix is the one
-//! that acts, with fibre lines and contact-aware mass. Both of these grow with the step, so the limit is the step that is its own limit.
-//! A contact that is just beginning adds mass on one side of the present state only. Forces there are not zero, and divided by two
-//! masses they would differ without any stiffness: both sides have the mass of both.
+//! The true limit of the time step: 2/ω of the fastest oscillation of the whole scene about its present state, by power
+//! iteration. Stiffness comes from differences of all forces, with every contact held by friction. The mass matrix includes
+//! selective mass scaling (fibre lines) and contact-aware mass. Both grow with the step, so the limit is a fixed point: the step
+//! that equals its own limit. A contact that is just beginning adds mass on one side of the present state only. Forces there are
+//! not zero, so unequal masses would give different accelerations without any stiffness. Both sides therefore have the mass of
+//! both.
 
 use super::Simulation;
 use crate::error::{Error, Result};
@@ -12,47 +13,47 @@ use crate::kernel::stage::{Plan, Stage};
 use crate::plan;
 use crate::settings::integration::Precision;
 
-/// Friction that holds every contact of a scene with friction.
+/// Friction coefficient at which every contact of a scene with friction sticks.
 const STICK: f64 = 1e6;
 /// Largest displacement of a node to either side, mm.
 const REACH: f64 = 1e-6;
-/// Time over which the displacement is made, s: so slowly that contact is not damped.
+/// Time over which the displacement is made, s: too long for contact damping to matter.
 const SLOWLY: f64 = 1.0;
-/// Rounds of power iteration after which ω must not have grown, and the most rounds there are.
+/// Rounds without growth of ω that end the power iteration, and the most rounds in all.
 const PATIENCE: usize = 20;
 const MOST_ROUNDS: usize = 1500;
-/// Relative growth of ω² that is none.
+/// Relative growth of ω² that counts as none.
 const SETTLED: f64 = 1e-3;
-/// Relative difference between a step that lasts and one that does not at which the limit is found.
+/// Relative difference between a stable and an unstable step at which the search ends.
 const SAME: f64 = 0.01;
-/// Least factor between two steps that are tried before both kinds are known.
+/// Least factor between two trial steps until the limit is bracketed.
 const STRIDE: f64 = 1.05;
-/// Where a step that is never long enough for its own mass is given up, as a multiple of the estimate.
+/// Multiple of the estimate at which the search is given up if every step is stable with its own mass.
 const FAR: f64 = 100.0;
 
 /// A measured limit of the time step.
 #[derive(Debug, Clone, Copy)]
 pub struct Limit {
-    /// Largest stable step, s; far too large where the scene buckles faster than it swings.
+    /// Largest stable step, s; far too large where the scene buckles faster than it oscillates.
     pub dt: f64,
     /// Node that moves most in the fastest oscillation.
     pub node: usize,
-    /// Direction in which it does.
+    /// Direction of this motion.
     pub direction: [f64; 3],
 }
 
 /// The scene about its present state.
 struct Oscillation<'a> {
     scene: &'a mut Simulation,
-    /// The step up to accelerations.
+    /// Stages of a step up to accelerations.
     stages: Vec<Stage>,
     row: Row<f64>,
-    /// Displacements at rest, mm, in planes.
+    /// Displacements of the present state, mm, in planes.
     rest: Vec<f64>,
     /// Components that may move.
     free: Vec<bool>,
     motion: Vec<f64>,
-    /// A times the motion.
+    /// Mass matrix A times the motion.
     inertia: Vec<f64>,
     /// Mass that contact has added on either side so far, tonne; none without contact-aware mass.
     added: Vec<f64>,
@@ -60,7 +61,7 @@ struct Oscillation<'a> {
 }
 
 impl Simulation {
-    /// Largest stable step at the present state. Take it where [`advance`](Self::advance) has returned; the state stays as it is.
+    /// Largest stable step at the present state. Call it after [`advance`](Self::advance) has returned; the state stays as it is.
     ///
     /// # Errors
     /// A run in f32, whose forces are too coarse for differences.
@@ -141,7 +142,8 @@ impl Simulation {
 }
 
 impl Oscillation<'_> {
-    /// 2/ω of the fastest oscillation with the mass that a step of `dt` calls for; infinite if a scene buckles faster than it swings.
+    /// 2/ω of the fastest oscillation with the mass that a step of `dt` requires; infinite if a scene buckles faster than it
+    /// oscillates.
     fn limit(&mut self, dt: f64) -> f64 {
         (self.row.dt, self.row.dt_mid) = (dt, 0.5 * (dt + SLOWLY));
         self.scene.backend.restore();
@@ -150,7 +152,7 @@ impl Oscillation<'_> {
         let (mut best, mut since) = (0.0, 0);
         for round in 0..MOST_ROUNDS {
             let (force, response) = self.respond();
-            // the quotient of Rayleigh, since A times the motion is known from the round before
+            // the Rayleigh quotient, since A times the motion is known from the previous round
             let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             let square = dot(&self.motion, &force) / dot(&self.motion, &self.inertia);
             if round > 0 && square > best * (1.0 + SETTLED) {
@@ -167,7 +169,7 @@ impl Oscillation<'_> {
         2.0 / best.sqrt()
     }
 
-    /// Adds a bit of every motion, so that none is missed.
+    /// Adds a random part to every free component, so that no mode is missed.
     fn stir(&mut self) {
         for (motion, free) in self.motion.iter_mut().zip(&self.free) {
             self.seed = self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -72,7 +72,7 @@ impl Simulation {
         }
         let settled = FIRST_SHARE + (1.0 - FIRST_SHARE) * (self.time / FIRST_TIME).min(1.0);
         let aim = (integration.safety * self.health.dt_limit).min(integration.dt_max_s) * settled * self.share;
-        // upwards by little, downwards at once
+        // increase gradually, decrease at once
         self.dt = if self.step == 0 { aim } else { aim.min(1.05 * self.dt) };
     }
 }

@@ -1,9 +1,11 @@
-//! A scene in time: drives a backend through the schedule, keeps the energy ledger, and stops what goes wrong. It writes no files.
+//! A scene in time: drives a backend through the schedule, keeps the energy balance, and stops runs that go wrong. It writes no
+//! files.
 //!
-//! Steps run in bursts, which grow as long as speeds do not and the contact skin is sure to last. After each burst the distance
-//! travelled decides on a contact search. At the end of each window of bursts the sums that kernels keep per item are added up on
-//! the backend, only totals come to the host, and guards look at energies and limits. They are those of one moment, where the last
-//! step starts: it is looked at between its forces and its motion, and velocities are the mean of those before and after.
+//! Steps run in bursts, which grow as long as speeds do not and the contact skin (Verlet skin) is sure to last. After each burst
+//! the distance travelled decides on a contact search. At the end of each window of bursts the backend adds up the sums that
+//! kernels keep per item, only totals come to the host, and guards look at energies and limits. All totals belong to the moment
+//! at which the last step starts: they are taken between its forces and its motion, and velocities are the mean of those before
+//! and after.
 
 mod backend_config;
 mod burst;
@@ -38,8 +40,8 @@ const BURST: u64 = 8;
 const WINDOW: u64 = 64;
 /// Growth of the largest speed over a burst after which bursts start short again.
 const CALM: f64 = 1.4;
-/// Change of the speed of shear over a window, as a share of it, from which windows are as short as a burst: external work
-/// is the mean stress of a window times its strain, so both must not change together.
+/// Relative change of the shear rate over a window above which windows are as short as a burst. External work is the mean stress
+/// of a window times its strain, so both must not change together.
 const STEADY: f64 = 0.1;
 /// Energy below which rounding decides its balance, mJ.
 const NOISE: f64 = 1e-6;
@@ -47,14 +49,14 @@ const NOISE: f64 = 1e-6;
 const AFFINE_REACH: f64 = 2.0;
 /// Speeds may grow by this factor during a burst.
 const SPEED_MARGIN: f64 = 2.0;
-/// Farthest that nodes may travel in a burst, mm, so that the range of positions is left by less than what wraps around.
+/// Largest travel of a node in a burst, mm: nodes that leave the range of positions must not wrap around.
 const FARTHEST: f64 = 3.0;
-/// Step that a run starts with, as a share of the limit: legs that start crushed need it while they relax.
+/// Initial time step, as a share of the limit: legs that start crushed need it while they relax.
 const FIRST_SHARE: f64 = 0.15;
-/// Time over which the first share grows to one, s.
+/// Time over which this share grows to one, s.
 const FIRST_TIME: f64 = 2e-4;
 
-/// What guards and reports want to know besides energies.
+/// Quantities for guards and reports besides energies.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Health {
     /// Smallest det F of all Gauss points, and the hexahedron (in the order of the mesh) that has it.
@@ -69,7 +71,7 @@ pub struct Health {
     /// Estimated limit of the time step without factors, s, and its node.
     pub dt_limit: f64,
     pub limiting_node: usize,
-    /// Mass added now by the floor and by contact, as a share of the true mass of solids and of threads.
+    /// Mass added now by the mass floor and by contact, as a share of the true mass of solids and of threads.
     pub added_mass: [f64; 2],
 }
 
@@ -87,12 +89,12 @@ pub struct Simulation {
     step: u64,
     dt: f64,
     dt_before: f64,
-    /// Factor on the time step: below one in a run that has gone back.
+    /// Factor on the time step: below one after a rollback.
     share: f64,
     searches: u64,
-    /// Slaves and beams that were searched since the last search of everything.
+    /// Slave nodes and beams searched since the last full search.
     searched: u64,
-    /// Seconds in stages of backends that larger tables have replaced.
+    /// Seconds in stages of earlier backends, which were replaced when tables grew.
     spent_before: Vec<(&'static str, f64)>,
     /// Largest speed of a node after the last burst, mm/s.
     speed: f64,
@@ -101,7 +103,7 @@ pub struct Simulation {
     /// Step of the last look at energies and limits.
     diagnosed: u64,
     gradient_at_search: Load,
-    /// And the stretch then.
+    /// Stretch at that search.
     stretch_at_search: [f64; 2],
     stretch: Stretch,
     energies: Energies,
@@ -111,9 +113,9 @@ pub struct Simulation {
     /// Step since which the energy balance is off by more than half of its tolerance.
     half_off: Option<u64>,
     stress: StressMean,
-    /// Half of the work of its motion, which the next look adds, mJ: see [`ledger`].
+    /// Second half of the motion work of the last step, which the next look adds, mJ: see [`ledger`].
     owed: [f64; 4],
-    /// Number of load steps behind which prescribed motion acts now; all of it in a new backend.
+    /// Number of completed load steps whose prescribed motion acts now; in a new backend all of it acts.
     acting: usize,
     ready: bool,
 }
@@ -134,7 +136,7 @@ impl Simulation {
         Self::with_capacity(scene, config, Capacity::default())
     }
 
-    /// A scene at rest at time zero whose contact tables start at a given size; they grow when they must.
+    /// A scene at rest at time zero whose contact tables start at a given size and grow when they must.
     ///
     /// # Errors
     /// Geometry that cannot be run.
@@ -185,7 +187,7 @@ impl Simulation {
     pub fn dt(&self) -> f64 {
         self.dt
     }
-    /// Factor on the time step: below one in a run that has gone back.
+    /// Factor on the time step: below one after a rollback.
     pub fn step_factor(&self) -> f64 {
         self.share
     }
@@ -210,7 +212,7 @@ impl Simulation {
     pub fn health(&self) -> &Health {
         &self.health
     }
-    /// What is prescribed now.
+    /// Prescribed loads now.
     pub fn load(&self) -> Load {
         self.schedule.load(self.time)
     }
@@ -218,7 +220,7 @@ impl Simulation {
     pub fn stretch(&self) -> [f64; 2] {
         self.stretch.at(self.time)
     }
-    /// The row of a step at `time` that goes on by `dt` and was reached by `before`.
+    /// The row of a step of `dt` from `time`, preceded by a step of `before`.
     fn row(&self, time: f64, dt: f64, before: f64) -> Row<f64> {
         self.schedule.row(time, dt, before, |time| self.stretch.at(time))
     }
@@ -233,10 +235,10 @@ impl Simulation {
     pub fn on_device(&self) -> bool {
         self.config.device.is_some()
     }
-    /// Whether the backend still computes.
+    /// Checks that the backend still computes.
     ///
     /// # Errors
-    /// What made it fail: numbers read from it since then are void.
+    /// The failure: numbers read from the backend since then are void.
     pub fn alive(&self) -> Result<()> {
         let at = |fault| format!("{fault}; noticed at step {} (t = {:.6e} s)", self.step, self.time);
         self.backend.fault().map_or(Ok(()), |fault| Err(Error::Device(at(fault))))
@@ -246,10 +248,10 @@ impl Simulation {
         self.time >= self.schedule.end() * (1.0 - 1e-12)
     }
 
-    /// Goes on until `until` (s), or until `stop` says so after a burst. The last step ends at or just behind `until`.
+    /// Goes on until `until` (s), or until `stop` says so at the end of a window of steps. The last step ends at or just after `until`.
     ///
     /// # Errors
-    /// A guard that was provoked, or a device that failed.
+    /// A guard that tripped, or a device that failed.
     pub fn advance(&mut self, until: f64, mut stop: impl FnMut(&Self) -> bool) -> Result<()> {
         if !self.ready {
             self.begin()?;
@@ -258,7 +260,7 @@ impl Simulation {
             self.steer();
             let (from, steps, window) = (self.time - self.dt_before, self.step, self.window());
             let looked = loop {
-                // rounding may leave a step that is hardly there: the last one of a window is looked at, so it is taken
+                // rounding may leave a tiny step; it is taken, since the last step of a window is looked at
                 let remaining = ((until.min(self.phase_end()) - self.time) / self.dt).ceil().max(1.0) as u64;
                 let left = remaining.min(steps + window - self.step);
                 let burst = left.min(self.burst);

@@ -1,8 +1,8 @@
-//! Going back: a scene that a guard stops returns to an earlier state and goes on with shorter steps, as often as its case
+//! Rollback: a scene that a guard stops returns to an earlier state and continues with shorter steps, as often as its case
 //! allows.
 //!
-//! What a guard notices has begun some time before. Therefore two states are kept, some steps apart, and the older one is where a
-//! scene goes back to. They are taken by the number of steps, never by wall time: going back leaves the bits reproducible.
+//! A guard notices a fault some time after it began. Two states are therefore kept, some steps apart, and a rollback returns to
+//! the older one. They are taken by the number of steps, never by wall time, so rollbacks leave the bits reproducible.
 
 use super::Simulation;
 use crate::error::{Error, Guard, Result};
@@ -10,10 +10,10 @@ use crate::kernel::record::{Record, Recorded};
 
 /// Fewest steps between two states that are kept.
 const APART: u64 = 1000;
-/// Factor on the time step each time that a scene goes back.
+/// Factor on the time step at each rollback.
 const SHORTER: f64 = 0.5;
 
-/// The states that a scene may go back to, each with what its owner carries, and the guards that sent it back.
+/// States for rollbacks, each with its owner's data, and the guards that caused rollbacks.
 #[derive(Debug)]
 pub struct Retries<T> {
     allowed: usize,
@@ -25,7 +25,7 @@ pub struct Retries<T> {
 #[derive(Debug, Clone, Default)]
 struct Kept<T> {
     step: u64,
-    /// As of [`Simulation::snapshot`]: on the host, names and bytes of the buffers, and what they hold.
+    /// As of [`Simulation::snapshot`]: state on the host, names and sizes of the buffers, and their contents.
     host: Vec<u8>,
     layout: Vec<(String, usize)>,
     contents: Vec<Vec<u8>>,
@@ -33,23 +33,23 @@ struct Kept<T> {
 }
 
 impl<T: Clone + Default> Retries<T> {
-    /// As many as the case of a simulation allows.
+    /// As many rollbacks as the case of a simulation allows.
     pub fn of(simulation: &Simulation) -> Self {
         Self { allowed: simulation.scene.integration.retries, guards: Vec::new(), kept: Vec::new() }
     }
 
-    /// What each guard said that sent the scene back.
+    /// Messages of the guards that caused rollbacks.
     pub fn guards(&self) -> &[String] {
         &self.guards
     }
 
-    /// Whether the state of now is one to keep.
+    /// Whether the present state is to be kept.
     pub fn due(&self, simulation: &Simulation) -> bool {
         let last = self.kept.last().map(|kept| kept.step);
         self.allowed > 0 && last.is_none_or(|last| simulation.step >= last + APART)
     }
 
-    /// Keeps the state of now with what its owner carries. Call it where [`Simulation::advance`] has returned.
+    /// Keeps the present state with its owner's data. Call it after [`Simulation::advance`] has returned.
     pub fn keep(&mut self, simulation: &mut Simulation, own: T) {
         let (host, buffers) = simulation.snapshot();
         let layout = buffers.iter().map(|(name, bytes)| ((*name).to_owned(), bytes.len())).collect();
@@ -60,10 +60,10 @@ impl<T: Clone + Default> Retries<T> {
         self.kept.push(Kept { step: simulation.step, host, layout, contents, own });
     }
 
-    /// Puts a scene that a guard stopped back to the older state, with shorter steps; returns what its owner carried then.
+    /// Rolls a scene that a guard stopped back to the older state, with shorter steps; returns the owner's data of that state.
     ///
     /// # Errors
-    /// The guard, if the scene has gone back as often as it may.
+    /// The guard, if all allowed rollbacks are spent.
     pub fn go_back(&mut self, simulation: &mut Simulation, mut guard: Guard) -> Result<T> {
         self.kept.truncate(1);
         let kept = match self.kept.first() {
@@ -84,7 +84,7 @@ impl<T: Clone + Default> Retries<T> {
         Ok(kept.own.clone())
     }
 
-    /// Writes or reads back everything but what the case says; `own` does so for what the owner carries.
+    /// Writes or reads everything but the settings of the case; `own` does so for the owner's data.
     pub fn record(&mut self, record: &mut Record, mut own: impl FnMut(&mut T, &mut Record)) {
         self.guards.record(record);
         let mut count = self.kept.len();

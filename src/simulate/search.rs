@@ -1,4 +1,4 @@
-//! The contact search as the host sees it: everything, or what has moved, with tables that grow when they overflow.
+//! The contact search on the host: everywhere or where bodies have moved, with tables that grow when they overflow.
 
 use super::Simulation;
 use crate::contact::penalty::GAPS;
@@ -10,7 +10,7 @@ use crate::kernel::position::QUANTUM;
 use crate::plan::{self, Capacity};
 
 impl Simulation {
-    /// Searches contact everywhere, and notes where nodes are: until the next time, their motion is counted from here.
+    /// Searches contact everywhere and stores the nodal positions, from which motion is measured until the next full search.
     pub(super) fn search_all(&mut self) -> Result<()> {
         let b = &self.model.buffers;
         if let Some(before) = b.before {
@@ -30,8 +30,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Runs the contact search where bodies have moved relative to each other, with larger tables if they overflow: what does not
-    /// fit is left as it was, so that a search that overflows leaves nothing that the next one does not find again.
+    /// Searches contact where bodies have moved relative to each other, and enlarges tables that overflow. A list that overflows
+    /// stays as it was, so the next search finds everything again.
     pub(super) fn search(&mut self) -> Result<()> {
         if self.model.plan.search.is_empty() {
             return Ok(());
@@ -77,7 +77,7 @@ impl Simulation {
     pub(super) fn grow(&mut self, capacity: Capacity) -> Result<()> {
         let model = plan::build(&self.scene, capacity)?;
         let mut backend = self.config.backend(&model)?;
-        // found again
+        // lists that the search makes anew are not moved
         let b = &self.model.buffers;
         let lists: Vec<_> = b.faces.iter().flatten().map(|faces| Some(faces.near)).collect();
         for (old, description) in self.model.plan.buffers.iter().enumerate() {
@@ -88,7 +88,7 @@ impl Simulation {
             else {
                 continue;
             };
-            // of gaps, those of faces are found again
+            // gaps of faces are searched anew
             let is_gaps = b.faces.iter().flatten().any(|faces| faces.gaps == Buffer(old));
             let bytes = self.backend.bytes(Buffer(old));
             let bytes = if is_gaps || model.plan.buffers[new].len != description.len {
@@ -113,7 +113,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Rows of a table that grows with its slots.
+    /// Number of rows of a table that grows with its slots.
     pub(super) fn items_of(&self, buffer: usize) -> usize {
         let b = &self.model.buffers;
         let kind =
@@ -133,8 +133,8 @@ impl Simulation {
     }
 }
 
-/// Slots of an old table in the first places of wider rows of a new one: lengths in numbers, how many rows, and the most numbers that
-/// are taken from each.
+/// Copies the rows of an old table into the first places of wider rows of a new one: lengths in numbers, number of rows, and most
+/// numbers taken from each.
 fn widen(old: &[u8], old_len: usize, fresh: &[u8], new_len: usize, items: usize, most: usize) -> Vec<u8> {
     let mut new = fresh.to_vec();
     if items == 0 || !old_len.is_multiple_of(items) || !new_len.is_multiple_of(items) {

@@ -1,4 +1,4 @@
-//! The whole state of a scene as bytes, and a scene that goes on from it to the same bits.
+//! The whole state of a scene as bytes, from which a scene continues to the same bits.
 
 use super::{Energies, Health, Simulation, StressMean, WINDOW};
 use crate::contact::candidates::MADE;
@@ -17,7 +17,7 @@ const MAX_DT: f64 = 1e-2;
 /// Largest cells of the contact search that a state may hold.
 const LARGEST_CELL: usize = 1 << 16;
 
-/// Lists of a search, filled from nothing whenever there is one.
+/// Lists that every search rebuilds from scratch.
 const REBUILT: [&str; 2] = ["items of cells", "cells"];
 
 impl Recorded for Load {
@@ -112,7 +112,7 @@ impl Simulation {
         self.owed.iter_mut().for_each(|x| x.record(record));
     }
 
-    /// State on the host and in every buffer that is no table. Take it where [`advance`](Self::advance) has returned.
+    /// State on the host and in every buffer that is not constant. Call it after [`advance`](Self::advance) has returned.
     pub fn snapshot(&mut self) -> (Vec<u8>, Vec<(&'static str, Vec<u8>)>) {
         let mut record = Record::new();
         self.capacity.record(&mut record);
@@ -144,7 +144,7 @@ impl Simulation {
             self.model = plan::build(&self.scene, capacity)?;
             self.backend = self.config.backend(&self.model)?;
             self.capacity = capacity;
-            // in a new backend all that is prescribed acts, until the next burst looks at the time
+            // in a new backend all prescribed motion acts until the next burst looks at the time
             self.acting = usize::MAX;
         }
         let changing = self.changing();
@@ -171,7 +171,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Refuses a record with numbers that no run has: one could not go on from them, or never end.
+    /// Refuses a record with numbers that no run has, from which a run could not continue or would never end.
     fn check_record(&self) -> Result<()> {
         let longest = [self.dt, self.dt_before].into_iter().fold(0.0, f64::max);
         let step = |dt: f64| (MIN_DT..=MAX_DT).contains(&dt) || !self.ready && dt == 0.0;
@@ -188,7 +188,7 @@ impl Simulation {
         within(self.step <= u64::MAX / 2, "number of steps", self.step as f64)
     }
 
-    /// Refuses places in tables that the scene does not have.
+    /// Refuses table indices that the scene does not have.
     fn check_indices(&self, buffer: Buffer, bytes: &[u8]) -> Result<()> {
         let b = &self.model.buffers;
         let numbers = || -> Vec<u32> { bytemuck::pod_collect_to_vec(bytes) };
@@ -222,7 +222,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Buffers that hold more than constants: what persists, and what the last steps left for tables and frames.
+    /// Buffers that hold more than constants: persistent state, and results of the last steps for tables and frames.
     pub(super) fn changing(&self) -> Vec<Buffer> {
         let buffers = self.model.plan.buffers.iter().enumerate();
         let changing =

@@ -1,4 +1,4 @@
-//! The state of a scene as the host sees it: positions, velocities, forces, fields for pictures, and its hash.
+//! The state of a scene on the host: positions, velocities, forces, fields for pictures, and its hash.
 
 use super::Simulation;
 use crate::contact::{EMPTY, candidates, penalty};
@@ -38,7 +38,7 @@ impl Simulation {
         self.backend.set_scalars(self.model.buffers.velocity, &planes.concat());
     }
 
-    /// Replaces the displacement of every node relative to F̄X, mm. What contact remembers stays as it is.
+    /// Replaces the displacement of every node relative to F̄X, mm. The contact history is kept.
     pub fn set_fluctuations(&mut self, displacements: &[[f64; 3]]) {
         let planes: [Vec<f64>; 3] = [0, 1, 2].map(|k| displacements.iter().map(|w| w[k]).collect());
         let planes = planes.concat();
@@ -57,7 +57,7 @@ impl Simulation {
         self.backend.uints(buffer).chunks_exact(2).map(|condition| condition[0] as usize).collect()
     }
 
-    /// Force that the scene exerts on the prescribed components of each of those nodes, N, in the last step.
+    /// Force of the scene on the prescribed components of each of these nodes in the last step, N.
     pub fn reactions(&self) -> Vec<[f64; 3]> {
         self.model
             .buffers
@@ -143,7 +143,7 @@ impl Simulation {
         fields
     }
 
-    /// Normal force, pressure of yarn surfaces, and with friction slip of contact points, on the nodes that they lie between.
+    /// Normal force, pressure on yarn surfaces and, with friction, slip of contact points, distributed to their nodes.
     pub(super) fn contact_fields(&self) -> Vec<Field> {
         let b = &self.model.buffers;
         let nodes = self.scene.mesh.nodes.len();

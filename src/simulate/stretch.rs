@@ -1,17 +1,17 @@
 //! Control of a periodic cell along its fibre directions: held, brought to a stretch, or driven to a membrane force.
 //!
-//! Stretches are linear in time between two looks at energies, so that nothing changes on a device: the row of each step has them.
-//! Behind a look the rate of a direction that is driven follows the error e of its mean force since the look before,
+//! Between two looks at energies, stretches are linear in time, and a device takes them from the row of each step. At a look, a
+//! proportional–integral control sets the rate of a driven direction from the error e of its mean force since the previous look,
 //!
 //! ```text
 //! ṡ ← ṡ − (PROPORTIONAL Δe + INTEGRAL e Δt/t₀)/(K t₀),   t₀ the time of a window of steps
 //! ```
 //!
-//! which leaves no error behind where the force drifts steadily. K is the stiffness that the cell shows: fibres that are straight
-//! are as stiff as their material, and wavy ones a hundred times less. It comes from the covariance of changes of force and of
-//! stretch from window to window. A control that works takes part of it away, since it makes the force follow its aim whatever the
-//! stretch does; K then falls, little by little, until force and stretch swing together, by which it shows. Where the stretch hardly
-//! changes, K is that of straight fibres, with which the control is slow and sure.
+//! which leaves no residual error where the force drifts steadily. K is the apparent stiffness of the cell: straight fibres are
+//! as stiff as their material, wavy fibres a hundred times softer. It comes from the covariance of changes of force and stretch
+//! from window to window. A working control hides part of this stiffness, since the force follows its target whatever the stretch
+//! does. K then falls gradually until force and stretch oscillate together, which reveals it. Where the stretch hardly changes, K
+//! is that of straight fibres, and the control is slow and safe.
 
 use super::{Simulation, WINDOW};
 use crate::kernel::record::{Record, Recorded};
@@ -21,22 +21,22 @@ use crate::mesh::{Mesh, quality};
 use crate::schedule::ramp;
 use crate::settings::steps::Along;
 
-/// Shares of a change of force and of its error that a window takes away.
+/// Gains: shares of a change of the force error and of the error itself that a window corrects.
 const PROPORTIONAL: f64 = 0.4;
 const INTEGRAL: f64 = 0.08;
-/// Weight of the newest window in what is known of the stiffness.
+/// Weight of the newest window in the stiffness estimate.
 const NEWEST: f64 = 0.1;
-/// Change of stretch in a window, beyond the usual one, that says nothing about stiffness.
+/// Deviation of the change of stretch in a window from its mean that says nothing about stiffness.
 const UNSEEN: f64 = 3e-7;
-/// Least stiffness, as a share of that of straight fibres, and the most that it falls by in a window.
+/// Least stiffness, as a share of that of straight fibres, and its smallest factor from one window to the next.
 const SOFTEST: f64 = 2e-3;
 const SOFTER: f64 = 0.95;
-/// Fastest stretch that follows a force, 1/s.
+/// Largest stretch rate under force control, 1/s.
 const FASTEST: f64 = 2.0;
 /// Share of a window of steps below which a window is too short to say anything about stiffness.
 const SHORT: f64 = 0.1;
 
-/// Stretch of both directions, x and y, and what drives it.
+/// Stretch of both directions, x and y, and its control.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stretch {
     directions: [Direction; 2],
@@ -55,9 +55,9 @@ pub(super) struct Stretch {
 struct Direction {
     /// At the last change of rates.
     stretch: f64,
-    /// Before and behind it, 1/s.
+    /// Rates before and after it, 1/s.
     rates: [f64; 2],
-    /// Stretch and membrane force, N/mm, as the load step began.
+    /// Stretch and membrane force, N/mm, at the start of the load step.
     from: [f64; 2],
     /// Mean membrane force over the last window, mean stretch, and the time of its middle, s.
     force: f64,
@@ -65,7 +65,7 @@ struct Direction {
     middle: f64,
     /// Error of the force over the last window, N/mm.
     error: f64,
-    /// Stiffness of straight fibres, N/mm, and what the cell shows.
+    /// Stiffness of straight fibres and apparent stiffness of the cell, N/mm.
     straight: f64,
     stiffness: f64,
     /// Changes of stretch and force in a window: their means, then variance and covariance.
@@ -79,9 +79,9 @@ pub struct Fibres {
     pub stretch: f64,
     /// Mean membrane force over the last window, N/mm.
     pub force: f64,
-    /// By how much it missed its aim, N/mm; `None` where it has none.
+    /// Force less its target, N/mm; `None` without a target.
     pub error: Option<f64>,
-    /// Stiffness that the control counts with, N/mm.
+    /// Stiffness that the control uses, N/mm.
     pub stiffness: f64,
 }
 
@@ -105,7 +105,7 @@ impl Recorded for Direction {
 }
 
 impl Stretch {
-    /// A mesh as it is given.
+    /// The control of a mesh in its reference position.
     pub(super) fn of(mesh: &Mesh) -> Self {
         let area = mesh.period.map_or(1.0, |[x, y]| x * y);
         let straight = |axis: usize| -> f64 {
@@ -122,14 +122,14 @@ impl Stretch {
         Self { directions: [0, 1].map(direction), since: 0.0, phase: 0, normalised: 0.0, angle: 0.0, seen: false }
     }
 
-    /// At a time that is not before the last window.
+    /// Stretches at a time that is not before the last window.
     pub(super) fn at(&self, time: f64) -> [f64; 2] {
         let after = time - self.since;
         self.directions.map(|d| d.stretch + d.rates[usize::from(after > 0.0)] * after)
     }
 
-    /// Takes note of the mean V P̄, N·mm, of a window, whose middle was at a time, s, and a shear angle; `usual` is the time of a window
-    /// of steps.
+    /// Records the mean V P̄ of a window, N·mm, with the time, s, and the shear angle at its middle; `usual` is the duration of a
+    /// full window.
     pub(super) fn see(&mut self, stress: [[f64; 2]; 2], [time, angle]: [f64; 2], usual: f64, area: f64) {
         let stretch = self.at(time);
         let forces = shear::membrane_forces(stress, angle, area);
@@ -146,7 +146,7 @@ impl Stretch {
 }
 
 impl Direction {
-    /// What the last window shows of the stiffness, N/mm.
+    /// Updates the stiffness estimate, N/mm, from the last window.
     fn learn(&mut self, force: f64, mean: f64, middle: f64, usual: f64) {
         let passed = middle - self.middle;
         if passed < SHORT * usual {
@@ -197,7 +197,7 @@ impl Simulation {
         let s = &mut self.stretch;
         let (corner, begins) = (shear::corner_force(s.normalised, s.angle), s.phase != number + 1);
         let done = |time: f64| ramp(((time - phase.start) / (phase.end - phase.start)).clamp(0.0, 1.0));
-        // a stretch is aimed at where the next window ends, at most where its load step does
+        // the target stretch is that at the end of the next window, or of the load step if earlier
         let ahead = if phase.stretches { window.min(phase.end - time).max(0.5 * self.dt) } else { window };
         let [share, share_ahead] = [time, time + ahead].map(|time| if phase.stretches { done(time) } else { 1.0 });
         for (k, d) in s.directions.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! `tricot compare`: how two results differ, in what was run, what came out and what it took.
+//! `tricot compare`: differences of two results in their cases, curves and cost.
 
 use super::difference::{Difference, common, difference, value};
 use super::results::{MEASURES, Measure, Results};
@@ -10,20 +10,20 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Most places of the cases that are listed.
+/// Largest number of listed differences between the cases.
 const PLACES: usize = 40;
-/// Columns of the table: a measure or a number of the summary, the relative differences of the first run from the second one,
-/// and the values of both at the end of the range that they share.
+/// Columns of the table: a measure or a number of the summary, the relative differences of the first run from the second, and the
+/// values of both at the end of their common range.
 const COMPARED: &[&str] = &["measure", "unit", "relative_l2", "relative_rms", "a", "b"];
 /// Numbers of the summary: name there, name and unit here.
 const FACTS: [[&str; 3]; 3] =
     [["steps", "steps", "1"], ["wall_s", "wall time", "s"], ["worst_energy_balance", "energy balance error", "1"]];
 
-/// How the results of a run differ from those of another.
+/// Differences between the results of two runs.
 #[derive(Debug, Clone)]
 pub struct Comparison {
     runs: [Results; 2],
-    /// Of every measure that both have: difference, and both values at the end of the common range.
+    /// For every measure that both have: difference, and both values at the end of the common range.
     measures: Vec<(&'static Measure, Difference, [f64; 2])>,
     range: [f64; 2],
 }
@@ -76,7 +76,7 @@ impl Comparison {
         Ok(())
     }
 
-    /// For programs; numbers that are none are null.
+    /// JSON for programs; NaN becomes null.
     pub fn json(&self) -> Value {
         let [a, b] = &self.runs;
         let measure = |(m, d, [a, b]): &(&Measure, Difference, [f64; 2])| json!({ "measure": m.name, "unit": m.unit, "relative_l2": d.l2, "relative_rms": d.rms, "a": a, "b": b });
@@ -94,7 +94,7 @@ impl Comparison {
         })
     }
 
-    /// For a person.
+    /// The comparison as text.
     pub fn text(&self) -> String {
         let mut t = String::new();
         let [low, high] = self.range;

@@ -1,9 +1,9 @@
-//! How far curves are apart: averaged over windows of the range that they share, then compared as a whole.
+//! Differences of curves: they are averaged over windows of their common range, then compared as a whole.
 //!
-//! Contact makes curves jitter from row to row, and runs write their rows at different places. A curve is therefore taken as
-//! linear between its points, and its mean over a window is what is compared.
+//! Contact makes curves jitter from row to row, and runs write rows at different abscissas. Curves are therefore linear between
+//! their points, and their means over windows are compared.
 
-/// Half width of a window over the common range: ±2° of a shear to 50°.
+/// Half width of a window over the common range: ±2° for a shear to 50°.
 const HALF: f64 = 0.04;
 /// Windows over a range; neighbours overlap by half.
 const WINDOWS: usize = 24;
@@ -11,7 +11,7 @@ const WINDOWS: usize = 24;
 /// A curve: points of abscissa and value, the abscissa rising.
 pub type Curve = Vec<[f64; 2]>;
 
-/// Relative differences of a curve from another.
+/// Relative differences between two curves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Difference {
     /// ‖a − b‖ / ‖b‖ over all windows: large values count most.
@@ -20,13 +20,13 @@ pub struct Difference {
     pub rms: f64,
 }
 
-/// Difference of a curve from another over the range that both have; `None` if there is none.
+/// Difference of two curves over their common range; `None` if there is none.
 pub fn difference(a: &[[f64; 2]], b: &[[f64; 2]]) -> Option<Difference> {
     let means = smoothed(&[a, b])?;
     Some(Difference { l2: relative_l2(&means[0], &means[1]), rms: relative_rms(&means[0], &means[1]) })
 }
 
-/// Means of curves over the same windows of the range that all of them have; `None` if there is none.
+/// Means of curves over the same windows of their common range; `None` if there is none.
 pub fn smoothed(curves: &[&[[f64; 2]]]) -> Option<Vec<Vec<f64>>> {
     let [low, high] = common(curves)?;
     let half = HALF * (high - low);
@@ -35,7 +35,7 @@ pub fn smoothed(curves: &[&[[f64; 2]]]) -> Option<Vec<Vec<f64>>> {
     Some(curves.iter().map(|curve| averaged(curve, &centres, half)).collect())
 }
 
-/// The range of the abscissa that all curves have; `None` if there is none.
+/// The common range of the abscissas; `None` if there is none.
 pub fn common(curves: &[&[[f64; 2]]]) -> Option<[f64; 2]> {
     let mut range = [f64::NEG_INFINITY, f64::INFINITY];
     for curve in curves {
@@ -45,7 +45,7 @@ pub fn common(curves: &[&[[f64; 2]]]) -> Option<[f64; 2]> {
     (range[0] < range[1] && range[1].is_finite()).then_some(range)
 }
 
-/// Means of a curve over `half` to both sides of every centre, as far as the curve reaches; NaN where it does not.
+/// Means of a curve within `half` of every centre, as far as the curve reaches; NaN beyond it.
 fn averaged(curve: &[[f64; 2]], centres: &[f64], half: f64) -> Vec<f64> {
     let mut integral = vec![0.0];
     for pair in curve.windows(2) {
@@ -65,7 +65,7 @@ fn averaged(curve: &[[f64; 2]], centres: &[f64], half: f64) -> Vec<f64> {
     centres.iter().map(mean).collect()
 }
 
-/// Value of a curve at a place within its range; NaN outside.
+/// Value of a curve at an abscissa within its range; NaN outside.
 pub fn value(curve: &[[f64; 2]], x: f64) -> f64 {
     match curve.iter().position(|p| p[0] >= x) {
         Some(0) if curve[0][0] == x => curve[0][1],
@@ -92,13 +92,13 @@ fn relative_rms(a: &[f64], b: &[f64]) -> f64 {
     libm::sqrt(squares.sum::<f64>() / a.len() as f64)
 }
 
-/// Mean of some lists of the same length, entry by entry.
+/// Mean of lists of equal length, entry by entry.
 fn mean(lists: &[Vec<f64>]) -> Vec<f64> {
     let entries = 0..lists.first().map_or(0, Vec::len);
     entries.map(|i| lists.iter().map(|list| list[i]).sum::<f64>() / lists.len() as f64).collect()
 }
 
-/// Scatter of runs that should agree: root mean square of their distances from their mean in L2. NaN for less than two.
+/// Scatter of runs that should agree: root mean square of their L2 distances from their mean. NaN for fewer than two.
 pub fn spread(lists: &[Vec<f64>]) -> f64 {
     if lists.len() < 2 {
         return f64::NAN;
@@ -108,7 +108,8 @@ pub fn spread(lists: &[Vec<f64>]) -> f64 {
     libm::sqrt(squares / lists.len() as f64)
 }
 
-/// How far two runs are apart by chance, from the [`spread`] of `count` runs: twice the variance that the spread estimates.
+/// Difference of two runs by chance, from the [`spread`] of `count` runs: its variance is twice the one that the spread
+/// estimates.
 pub fn by_chance(spread: f64, count: usize) -> f64 {
     let count = count as f64;
     spread * libm::sqrt(2.0 * count / (count - 1.0))
@@ -144,7 +145,7 @@ mod tests {
         assert!(same.l2 < 1e-3 && same.rms < 0.02, "{same:?}");
         let larger = difference(&sampled(400, [0.0, 40.0], |x| 1.1 * law(x)), &fine).unwrap();
         assert!((larger.l2 - 0.1).abs() < 1e-4 && (larger.rms - 0.1).abs() < 1e-4, "{larger:?}");
-        // an offset at small values counts little in one and much in the other
+        // an offset at small values counts little in one measure and much in the other
         let offset = difference(&sampled(400, [0.5, 50.0], |x| law(x) + 0.1), &fine).unwrap();
         assert!(offset.l2 < 0.02 && offset.rms > 0.1, "{offset:?}");
         assert!(difference(&sampled(9, [60.0, 70.0], law), &fine).is_none());

@@ -1,9 +1,8 @@
-//! `tricot study effects`: every effect of a scene turned off in turn: what it costs, and what it changes.
+//! `tricot study effects`: turns off every effect of a scene in turn, and measures its cost and its influence.
 //!
-//! Each variant is run to its end beside the scene as it is, and its curves are compared with those of the scene. Times of the
-//! step are not taken from these runs, which meet whatever else the machine does at different moments: a variant and the scene
-//! take turns from where the last load step begins. One variant has every effect and starts a micrometre aside: changes
-//! as small as its own are chance.
+//! Each variant runs to its end, and its curves are compared with those of the full scene. Step times are not taken from these
+//! runs, since the load of the machine varies: a variant and the scene take turns from the start of the last load step. One
+//! variant has every effect and starts a micrometre aside: changes no larger than its own are chance.
 
 use super::difference::difference;
 use super::results::{MEASURES, Measure, Results};
@@ -26,35 +25,35 @@ const TURNS: usize = 9;
 const TURN_S: f64 = 0.05;
 /// Steps of a turn.
 const STEPS: [u64; 2] = [64, 1024];
-/// What the variant that has every effect is called.
+/// Name of the variant that has every effect.
 const NOTHING: &str = "nothing (a µm aside)";
 
-/// What a study of effects is asked for.
+/// Options of a study of effects.
 #[derive(Debug, Clone)]
 pub struct Options {
     pub config: BackendConfig,
-    /// Names of the effects that are turned off; empty for all.
+    /// Names of the effects to turn off; empty for all.
     pub only: Vec<String>,
-    /// The table; runs go into the folder of the same name beside it.
+    /// Path of the table; runs go into the folder of the same name beside it.
     pub table: PathBuf,
     /// Move earlier runs aside.
     pub force: bool,
 }
 
-/// What a study found.
+/// Result of a study.
 #[derive(Debug, Clone)]
 pub struct Study {
     /// The table as text.
     pub text: String,
-    /// The user stopped it; the table holds what was done by then.
+    /// Whether the user stopped it; the table holds the results up to then.
     pub interrupted: bool,
 }
 
-/// A scene that was run.
+/// A completed run.
 struct Done {
     loaded: Loaded,
     folder: PathBuf,
-    /// What stopped it; `None` if it finished.
+    /// The guard that stopped it; `None` if it finished.
     guard: Option<Guard>,
     results: Results,
 }
@@ -72,15 +71,15 @@ struct Row {
     steps: f64,
     step_time: Ratio,
     run_time: f64,
-    /// Difference of every measure; not a number where the variant has no curve in common with the scene.
+    /// Difference in every measure; NaN where the variant has no curve in common with the scene.
     changes: Vec<f64>,
 }
 
 /// Runs a scene with all its effects and without each, and writes the table row by row.
 ///
 /// # Errors
-/// An effect that the scene does not have, a folder that is in use, a table that cannot be written. A guard that stops a variant is
-/// its verdict; one that stops the scene itself is an error, since there is nothing to compare with.
+/// An effect that the scene does not have, a folder in use, a table that cannot be written. A guard that stops a variant is its
+/// verdict; a guard that stops the scene itself is an error, since nothing remains to compare with.
 pub fn effects(loaded: &Loaded, options: &Options) -> Result<Study> {
     let scene = plain(loaded, options);
     let mut variants = vec![(NOTHING, aside(&scene))];
@@ -128,7 +127,7 @@ fn aside(scene: &Loaded) -> Loaded {
     aside
 }
 
-/// The scene without each effect that can be turned off and is asked for.
+/// One scene without each requested effect that can be turned off.
 fn chosen(scene: &Loaded, options: &Options) -> Result<Vec<(&'static str, Loaded)>> {
     let mut simulation = run::simulation(scene, options.config.clone())?;
     simulation.advance(0.0, |_| false)?;
@@ -150,7 +149,7 @@ fn slug(name: &str) -> String {
     name.split(" (").next().unwrap_or(name).chars().map(letters).collect()
 }
 
-/// Runs a scene to its end or to a guard; `None` if the user stopped it.
+/// Runs a scene until its end or a guard; `None` if the user stopped it.
 fn finish(scene: &Loaded, folder: &Path, options: &Options) -> Result<Option<Done>> {
     let how = run::Options {
         output: folder.into(),
@@ -173,7 +172,7 @@ fn finish(scene: &Loaded, folder: &Path, options: &Options) -> Result<Option<Don
     Ok(Some(Done { loaded: scene.clone(), folder: folder.into(), guard, results }))
 }
 
-/// What a variant costs and changes.
+/// Cost and influence of the effect that a variant lacks.
 fn compare(name: &'static str, variant: &Done, whole: &Done, measures: &[&Measure], options: &Options) -> Result<Row> {
     let step_time = match (start(variant, options)?, start(whole, options)?) {
         (Some(mut scene), Some(mut beside)) => {
@@ -197,7 +196,7 @@ fn compare(name: &'static str, variant: &Done, whole: &Done, measures: &[&Measur
     })
 }
 
-/// A scene where its last load step begins; `None` if it did not come there.
+/// The scene at the start of its last load step; `None` if it did not get there.
 fn start(done: &Done, options: &Options) -> Result<Option<Simulation>> {
     let steps = &done.loaded.case.steps;
     let Some(before) = steps.len().checked_sub(2) else {
@@ -211,7 +210,7 @@ fn start(done: &Done, options: &Options) -> Result<Option<Simulation>> {
     found.map(|state| run::simulation_at(&done.loaded, trial(&options.config), &state)).transpose()
 }
 
-/// The table for a person.
+/// The table as text.
 fn text(whole: &Done, measures: &[&Measure], rows: &[Row], table: &Path) -> String {
     let mut t = String::new();
     // writing to a String does not fail

@@ -1,8 +1,8 @@
 //! Many runs at once: tables over a folder of scenes, and how results differ.
 //!
-//! [`difference`] holds the mathematics of comparing curves, [`results`] reads them from the folder of a run, and
-//! [`compare`] says how two folders differ. [`accuracy`] runs a case many times, to measure what accuracy costs; [`effects`] turns
-//! its effects off one by one.
+//! [`difference`] holds the mathematics of comparing curves, [`results`] reads them from the folder of a run, and [`compare`]
+//! compares two folders. [`accuracy`] runs a case many times to measure the cost of accuracy; [`effects`] turns effects off one
+//! by one.
 
 pub mod accuracy;
 pub mod compare;

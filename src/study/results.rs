@@ -1,4 +1,4 @@
-//! The results of a run as curves: what is measured, over the shear angle of a cell or the way of a clamp.
+//! The results of a run as curves: measures over the shear angle of a cell or the displacement of a clamp.
 
 use super::difference::Curve;
 use crate::case::parse;
@@ -8,10 +8,10 @@ use crate::run::CASE;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// What curves are drawn over: the first load steps of a kind, or time if there are none of any.
+/// Abscissa of the curves: the first load steps of a kind, or time if there are none of either.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axis {
-    /// Size of the shear angle of a cell, degrees.
+    /// Absolute shear angle of a cell, degrees.
     Angle,
     /// Displacement of a clamp, mm.
     Displacement,
@@ -57,9 +57,9 @@ pub struct Measure {
     column: &'static str,
     /// The axes over which it is a curve.
     over: &'static [Axis],
-    /// A mean over the row: it belongs between this row and the one before.
+    /// Whether it is a mean over the row: it then belongs between this row and the previous one.
     of_row: bool,
-    /// Changes its sign with the shear angle.
+    /// Whether it changes sign with the shear angle.
     odd: bool,
 }
 
@@ -69,7 +69,7 @@ const fn at_row(name: &'static str, unit: &'static str, source: Source, column: 
     Measure { name, unit, source, column, over, of_row: false, odd: false }
 }
 
-/// What runs are compared by; a scene has some of them. The first one that it has is its force.
+/// Measures by which runs are compared; a scene has some of them. The first one that it has is its force.
 pub const MEASURES: &[Measure] = &[
     Measure {
         over: &[Axis::Angle],
@@ -128,7 +128,7 @@ impl Results {
         })
     }
 
-    /// A number of the summary; NaN if there is none.
+    /// A number in the summary; NaN if absent.
     pub fn number(&self, name: &str) -> f64 {
         self.summary[name].as_f64().unwrap_or(f64::NAN)
     }
@@ -138,7 +138,7 @@ impl Results {
         self.summary["verdict"].as_str().unwrap_or("not finished")
     }
 
-    /// What its curves are drawn over.
+    /// Abscissa of its curves.
     pub fn axis(&self) -> Axis {
         let phases = self.history.texts("phase");
         let loaded = |axis: &Axis| axis.column().1.is_some_and(|phase| phases.contains(&phase));

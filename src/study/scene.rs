@@ -1,5 +1,4 @@
-//! One scene from start to end without files: what guards and reports look at on the way, and whether the case's expectations
-//! hold.
+//! One scene from start to end without files: it records extremes on the way and checks the expectations of the case.
 
 use crate::case::expect::{Expect, Quantity, Verdict};
 use crate::error::{Error, Result};
@@ -11,21 +10,21 @@ use crate::simulate::{BackendConfig, Energies, Retries, Simulation};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What was seen of a run.
+/// Observations of a run.
 #[derive(Debug, Clone)]
 pub struct Observed {
     pub verdict: Verdict,
-    /// What the guard said; empty if the run finished.
+    /// Message of the guard; empty if the run finished.
     pub message: String,
     pub steps: u64,
-    /// How often the scene went back to go on with shorter steps.
+    /// Number of rollbacks.
     pub retries: usize,
-    /// Whether it was left before its end, after as many steps as were wanted.
+    /// Whether it was left before its end, at the given number of steps.
     pub cut: bool,
     /// Smallest step, and smallest estimated limit without factors, s.
     pub dt: f64,
     pub dt_limit: f64,
-    /// Largest error of the energy balance, without its sign, over the largest energy, before a guard stops the scene.
+    /// Largest absolute error of the energy balance before a guard stops the scene, over the largest energy.
     pub balance: f64,
     /// Largest penetration of any kind, mm.
     pub penetration: f64,
@@ -33,18 +32,19 @@ pub struct Observed {
     pub min_jacobian: f64,
     /// Energies at the end.
     pub energies: Energies,
-    /// Distance of every node from where it started, at the end, sorted, mm.
+    /// Distances between initial and final positions of all nodes, sorted, mm.
     pub displacements: Vec<f64>,
-    /// Largest distance of a node from where it was when the last load step began, mm.
+    /// Largest distance between the positions of a node at the beginning and end of the last load step, mm.
     pub drift: f64,
     pub thickness_ratio: f64,
     /// Largest force in a beam at the end, N.
     pub tension: f64,
-    /// Force in the last beam of the first thread over that in its first, at looks in the middle half of the last load step.
+    /// Force in the last beam of the first thread over the force in its first beam, at looks in the middle half of the last load
+    /// step.
     pub tension_ratios: Vec<f64>,
 }
 
-/// Scenes on one machine; each is run once.
+/// Scenes on one machine; each runs once.
 pub struct Scenes {
     config: BackendConfig,
     /// Steps after which a scene is left.
@@ -58,12 +58,12 @@ impl Scenes {
         Self { config, longest: u64::MAX, seen: BTreeMap::new() }
     }
 
-    /// Leaves every scene after so many steps.
+    /// Leaves every scene after this number of steps.
     pub fn longest(self, steps: u64) -> Self {
         Self { longest: steps, ..self }
     }
 
-    /// Runs a case with overrides, and says which expectations do not hold.
+    /// Runs a case with overrides, and returns the expectations that fail.
     ///
     /// # Errors
     /// A case that cannot be run. A guard that stops the run is a verdict.
@@ -92,7 +92,7 @@ impl Scenes {
     }
 }
 
-/// Runs a simulation to its end, for so many steps, or to a guard that stops it for good.
+/// Runs a simulation to its end, for `longest` steps, or until a guard stops it for good.
 fn observe(mut simulation: Simulation, longest: u64) -> Result<Observed> {
     let mut retries = Retries::of(&simulation);
     let mut way = Way::default();
@@ -104,7 +104,7 @@ fn observe(mut simulation: Simulation, longest: u64) -> Result<Observed> {
             Err(Error::Guard(guard)) => match retries.go_back(&mut simulation, guard) {
                 Ok(earlier) => way = earlier,
                 Err(error) => {
-                    // the state that a guard stops is not one of the results, whose balance is judged
+                    // the state that trips a guard is not part of the results whose balance is judged
                     way.seen.look(&simulation);
                     way.seen.stop(error)?;
                     break;
@@ -122,7 +122,7 @@ fn observe(mut simulation: Simulation, longest: u64) -> Result<Observed> {
     Ok(seen)
 }
 
-/// How far a scene has come, and what was seen on the way.
+/// Progress of a scene, and its observations.
 #[derive(Debug, Clone, Default)]
 struct Way {
     /// Load steps that are complete.
@@ -134,7 +134,7 @@ struct Way {
 }
 
 impl Way {
-    /// Goes on to the end of the load step, to a number of steps, or until there is a state to keep.
+    /// Continues to the end of the load step, to a number of steps, or until a state is due to be kept.
     fn go(&mut self, simulation: &mut Simulation, retries: &Retries<Self>, longest: u64) -> Result<()> {
         let Phase { start, end, .. } = simulation.schedule.phases()[self.phase];
         if self.before.is_empty() {
@@ -165,11 +165,11 @@ impl Way {
     }
 }
 
-/// The balance of energies over a whole run: what is small beside the energy that a run has in the end is no error, however
-/// large it is beside what was there when it arose.
+/// The energy balance over a whole run. It relates the error to the largest energy of the run, not to the energy at the time the
+/// error arose.
 #[derive(Debug, Clone)]
 struct Ledger {
-    /// What the first look finds, mJ.
+    /// Value at the first look, mJ.
     start: Option<f64>,
     /// Largest error and largest energy so far, mJ.
     error: f64,
@@ -186,7 +186,7 @@ impl Ledger {
     fn look(&mut self, e: &Energies) {
         let kept = e.output() - e.input();
         let error = (kept - *self.start.get_or_insert(kept)).abs();
-        // a maximum would forget what is not a number
+        // a maximum would drop NaN
         if error.is_nan() || error > self.error {
             self.error = error;
         }
@@ -218,7 +218,7 @@ impl Default for Observed {
 }
 
 impl Observed {
-    /// Takes note of a window.
+    /// Records a window.
     fn look(&mut self, s: &Simulation) {
         let h = s.health();
         self.steps = s.step();
@@ -228,7 +228,7 @@ impl Observed {
         self.min_jacobian = self.min_jacobian.min(h.min_jacobian);
     }
 
-    /// Takes note of a guard; another error is passed on.
+    /// Records a guard; any other error is passed on.
     fn stop(&mut self, error: Error) -> Result<()> {
         let Error::Guard(guard) = error else { return Err(error) };
         self.verdict = Verdict::of_cause(&guard.cause).unwrap_or(Verdict::Stopped);
@@ -236,7 +236,7 @@ impl Observed {
         Ok(())
     }
 
-    /// Takes note of the end.
+    /// Records the end.
     fn end(&mut self, s: &Simulation, before: &[[f64; 3]]) {
         let now = s.fluctuations();
         self.energies = *s.energies();
@@ -248,7 +248,7 @@ impl Observed {
         self.tension = tensions.iter().copied().fold(f64::NAN, f64::max);
     }
 
-    /// Takes note of how a thread slides.
+    /// Records the tension ratio of a sliding thread.
     fn slide(&mut self, s: &Simulation) {
         if let Some(thread) = s.mesh().threads.first() {
             let tensions = s.tensions();
@@ -261,7 +261,7 @@ impl Observed {
         self.tension_ratios.iter().sum::<f64>() / self.tension_ratios.len() as f64
     }
 
-    /// How far two runs are apart, relative to the other one.
+    /// Difference of two runs, relative to the other run.
     fn apart(&self, other: &Self, quantity: Quantity) -> f64 {
         match quantity {
             Quantity::Displacements if self.displacements.len() != other.displacements.len() => f64::NAN,
@@ -304,7 +304,7 @@ impl Observed {
     }
 }
 
-/// Smallest distance between the lowest and the highest layer of nodes of the first block over that at the start.
+/// Smallest distance between the lowest and highest node layers of the first block, over the initial one.
 fn thickness_ratio(mesh: &Mesh, moved: &[[f64; 3]]) -> f64 {
     let Some(block) = mesh.blocks.first() else { return f64::NAN };
     let layer = block.count() / (block.layers + 1);

@@ -1,4 +1,4 @@
-//! `tricot study stability`: every scene of a folder on every machine, as a table of how it went.
+//! `tricot study stability`: runs every scene of a folder on every machine and tabulates the outcome.
 
 use super::scene::Scenes;
 use crate::backend::gpu::Device;
@@ -26,16 +26,16 @@ const STABILITY: &[&str] = &[
     "as_expected",
 ];
 
-/// What a study found.
+/// Result of a study.
 pub struct Study {
-    /// The table as text, and what did not hold.
+    /// The table as text, and the failed expectations.
     pub text: String,
     /// Whether every expectation held.
     pub held: bool,
 }
 
-/// The machines that scenes are run on, with their names: the CPU in both precisions, and an adapter. By itself a study takes
-/// the adapter if there is one.
+/// The machines for the scenes, with their names: the CPU in both precisions, and an adapter. By default a study uses an adapter
+/// if there is one.
 fn machines(wanted: Machine) -> Result<Vec<(&'static str, BackendConfig)>> {
     let cpu = |precision| BackendConfig { precision, ..BackendConfig::default() };
     let mut machines = Vec::new();
@@ -66,7 +66,7 @@ pub fn scenes(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Runs every scene of a folder on every machine, each for so many steps at most, and writes the table, row by row.
+/// Runs every scene of a folder on every machine, each for at most `longest` steps, and writes the table row by row.
 ///
 /// # Errors
 /// A case that cannot be run, a table that cannot be written, or no adapter where one is wanted.
@@ -83,7 +83,7 @@ pub fn stability(folder: &Path, machine: Machine, longest: Option<u64>, table: &
         for path in &paths {
             let (seen, mut broken) = scenes.examine(path, &[])?;
             if seen.cut {
-                // what it must show at its end, it cannot show yet
+                // expectations at the end cannot be judged yet
                 broken.clear();
             }
             let ended = if seen.cut { "cut short" } else { seen.verdict.name() };

@@ -1,8 +1,8 @@
-//! `tricot study step`: the limit of the time step that a scene really has beside the one that is estimated, on its way.
+//! `tricot study step`: the true limit of the time step beside the estimated one, in the course of a run.
 //!
-//! Contact adds the mass that a step of its length needs, and the measured limit is the longest step that lasts with its
-//! own mass. The estimate counts the mass of the step in use. So that both speak of one scene, steps here may grow to
-//! `LIFTED` times the longest that the case allows, in effect to what the estimate says.
+//! Contact adds the mass that the current time step requires, and the measured limit is the longest stable step with its own
+//! added mass. The estimate uses the mass of the step in use. For a fair comparison, steps here may grow to `LIFTED` times the
+//! longest step of the case, in effect up to the estimate.
 
 use crate::error::{Error, Result};
 use crate::rigs::read::Loaded;
@@ -13,14 +13,14 @@ use crate::settings::steps::Step;
 use crate::simulate::{BackendConfig, Simulation};
 use std::fmt::Write as _;
 
-/// Steps within which one that is too long must show.
+/// Number of steps within which too long a step must fail.
 const TRIAL: u64 = 2000;
 /// Factor on the longest step that the case allows.
 const LIFTED: f64 = 10.0;
-/// Relative width at which the search for the longest step that holds ends.
+/// Relative width at which the search for the longest stable step ends.
 const NARROW: f64 = 0.05;
 
-/// A state on the way.
+/// A state in the course of a run.
 #[derive(Debug, Clone)]
 pub struct State {
     pub time: f64,
@@ -29,7 +29,7 @@ pub struct State {
     pub dt: f64,
     pub estimate: f64,
     pub limit: f64,
-    /// Bodies that set the estimate and the limit.
+    /// Bodies that determine the estimate and the limit.
     pub estimate_set_by: String,
     pub limit_set_by: String,
 }
@@ -41,7 +41,7 @@ impl State {
     }
 }
 
-/// What a study found.
+/// Result of a study.
 pub struct Study {
     pub text: String,
     pub held: bool,
@@ -49,7 +49,7 @@ pub struct Study {
 
 /// Times at which load steps end and at which the shear angle passes a multiple of `every_deg`.
 fn moments(schedule: &Schedule, every_deg: f64) -> Vec<f64> {
-    /// Looks in a load step.
+    /// Number of looks per load step.
     const LOOKS: u32 = 2000;
     let count = |time: f64| (schedule.load(time).angle.to_degrees() / every_deg + 1e-9).floor();
     let mut moments = Vec::new();
@@ -94,7 +94,7 @@ pub fn measure(scene: &mut Simulation) -> Result<State> {
     })
 }
 
-/// The longest fixed step that lasts for 2,000 steps from the present state under the load there, between the estimate and
+/// The longest fixed time step that is stable for 2,000 steps from the present state under its load, between the estimate and
 /// `most`, s.
 ///
 /// # Errors
@@ -130,8 +130,8 @@ pub fn longest_step(loaded: &Loaded, scene: &mut Simulation, most: f64) -> Resul
     Ok((low, high))
 }
 
-/// Runs a case in f64, with steps as long as the estimate says, and measures the limit at the end of every load step and at every multiple of `every_deg` of shear; if
-/// `confirm`, also tries fixed steps at the end of the first load step.
+/// Runs a case in f64 with steps up to the estimate, and measures the limit at the end of every load step and at every multiple
+/// of `every_deg` of shear. If `confirm`, also tries fixed steps at the end of the first load step.
 ///
 /// # Errors
 /// A case that cannot be run, or a guard that stopped it.

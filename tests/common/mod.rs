@@ -1,4 +1,4 @@
-//! Shared by the verification tests: cases from JSON snippets, and checks that print what they reached.
+//! Shared by the verification tests: cases from JSON snippets, and checks that print their results.
 #![allow(dead_code)]
 
 pub mod program;
@@ -10,8 +10,8 @@ use tricot::run::{self, Machine, Options};
 use tricot::settings::integration::Precision;
 use tricot::simulate::{BackendConfig, Simulation};
 
-/// Prints a number beside what it should be, and fails if it is further away than `tolerance` times that (or than
-/// `tolerance` itself where zero is expected).
+/// Prints a number beside its expected value, and fails if the relative difference exceeds `tolerance` (the absolute one where
+/// zero is expected).
 #[track_caller]
 pub fn near(what: &str, got: f64, expected: f64, tolerance: f64) {
     let scale = if expected == 0.0 { 1.0 } else { expected.abs() };
@@ -41,13 +41,13 @@ pub fn start(case: &Value, precision: Precision) -> Simulation {
         .unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Goes on to a time without looking.
+/// Advances to a time without a check.
 #[track_caller]
 pub fn advance(simulation: &mut Simulation, until: f64) {
     simulation.advance(until, |_| false).unwrap_or_else(|e| panic!("{e}"));
 }
 
-/// A free scene without any effect, to be filled in.
+/// A free scene without effects, to be filled in.
 pub fn bare() -> Value {
     json!({
         "title": "verification",
@@ -94,7 +94,7 @@ pub fn held_specimen() -> Value {
     )
 }
 
-/// A run on the CPU that leaves its results in a folder and tells nothing.
+/// A quiet run on the CPU that leaves its results in a folder.
 pub fn options(output: PathBuf, threads: usize) -> Options {
     Options {
         output,
@@ -122,7 +122,7 @@ pub fn with(mut value: Value, changes: &[(&str, Value)]) -> Value {
     value
 }
 
-/// The case with hexahedra of one integration point.
+/// The case with hexahedra of one Gauss point.
 pub fn reduced(mut case: Value) -> Value {
     case["integration"]["hexahedra"] = json!("reduced");
     case
@@ -141,7 +141,7 @@ pub fn block(name: &str, elements: [usize; 3], corners: [[f64; 3]; 2], density: 
     json!({ "name": name, "elements": elements, "corners": corners, "density_t_mm3": density, "material": material })
 }
 
-/// A block whose node at slice, column and layer (0 to 1 each) is where `place` says.
+/// A block whose node at slice, column and layer (0 to 1 each) lies where `place` puts it.
 pub fn shaped(
     name: &str,
     elements: [usize; 3],

@@ -1,4 +1,4 @@
-//! The program on a case in a folder, and what it left there.
+//! Runs the program on a case in a folder, and reads its results.
 
 use serde_json::Value;
 use std::fs;
@@ -29,7 +29,7 @@ pub fn ran(folder: &Path, output: &str, more: &[&str]) {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// The one line that a program says which failed with an exit code.
+/// The one line of a program that failed with an exit code.
 #[track_caller]
 pub fn failed(output: &Output, code: i32) -> String {
     let text = String::from_utf8(output.stderr.clone()).unwrap();
@@ -53,7 +53,7 @@ pub fn contents(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     found
 }
 
-/// Everything that does not speak of wall time: names and bytes.
+/// Names and bytes of all results that do not depend on wall time.
 fn results(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let timed = |path: &Path| path.starts_with("state") || ["summary.json", "run.log"].map(Path::new).contains(&path);
     let files = contents(dir).into_iter().map(|(path, bytes)| (path.strip_prefix(dir).unwrap().to_path_buf(), bytes));
@@ -92,7 +92,8 @@ pub fn can_resume(results: &Path) -> bool {
     entries.into_iter().any(|f| f.unwrap().path().extension().is_some_and(|e| e == "state"))
 }
 
-/// Kills a program after some time, by a signal that it cannot catch; whether it was still there, and whether it had ended well.
+/// Kills a program after some time by a signal that it cannot catch. Returns whether it was still running, and whether it had
+/// succeeded.
 pub fn kill_after(mut child: Child, wait: Duration) -> (bool, bool) {
     std::thread::sleep(wait);
     let alive = child.try_wait().unwrap().is_none();

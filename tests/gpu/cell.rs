@@ -1,5 +1,5 @@
 //! A cell from pre-tension to 10° of shear on the GPU backend against the CPU, and how runs on a device end. Without an adapter
-//! the tests say so and go on, unless TRICOT_REQUIRE_ADAPTER is set.
+//! the tests say so and pass, unless TRICOT_REQUIRE_ADAPTER is set.
 
 use crate::common::options;
 use serde_json::Value;
@@ -35,7 +35,7 @@ const SHORT: [&str; 4] = [
     "steps.0.pretension.time_s=1e-4",
     "steps.1.stretch.time_s=2e-5",
     "steps.2.shear.time_s=5e-5",
-    // so short a tightening is a blow
+    // so short a tightening acts as an impact
     "integration.energy_tolerance=100",
 ];
 
@@ -55,7 +55,7 @@ fn device() -> Option<Arc<Device>> {
     }
 }
 
-/// What a run gives: width, thickness and gap of warp and weft after tightening, mm, and F_nor over rows of one degree.
+/// Results of a run: width, thickness and gap of warp and weft after tightening, mm, and F_nor over rows of one degree.
 struct Result {
     sizes: Vec<f64>,
     forces: Vec<f64>,
@@ -151,7 +151,7 @@ fn a_device_that_is_lost_stops_the_run_with_its_name() {
     assert_eq!(error.exit_code(), 6);
 }
 
-/// What is on disk when a device is lost in the middle of a run is whole, and stays.
+/// When a device is lost in the middle of a run, files on disk are complete and stay.
 #[test]
 fn a_device_that_is_lost_leaves_whole_results() {
     let Some(device) = device() else { return };
@@ -258,7 +258,7 @@ fn the_program_names_the_device_and_refuses_what_it_cannot_do() {
     assert!(summary["backend"].as_str().unwrap().contains(&device.listed().name), "{summary:#}");
 }
 
-/// The validation layer of Vulkan finds nothing to say about a whole short run.
+/// The validation layer of Vulkan reports nothing over a whole short run.
 #[test]
 #[cfg(target_os = "linux")]
 fn validation_layers_find_nothing() {

@@ -1,5 +1,5 @@
-//! The WGSL twins of all stages: each is there, compiles by itself, and sees the buffers, the row and the parameters of its
-//! stage with the layout that Rust gives them, as naga reads it from the text.
+//! The WGSL twins of all stages: each is there, compiles by itself, and sees the buffers, the row and the parameters of its stage
+//! with the layout that Rust gives them, as naga parses it.
 
 use crate::common::{bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, reduced, with};
 use naga::{AddressSpace, ScalarKind, StorageAccess, TypeInner};
@@ -139,7 +139,7 @@ fn members(module: &naga::Module, name: &str) -> Option<(Vec<Field<String>>, u32
     Some((merged, *span))
 }
 
-/// Compares what the twin of a stage sees with what the stage binds.
+/// Compares the declarations in the twin of a stage with the bindings of the stage.
 fn check(name: &str, stage: &Stage, buffers: &[Description]) {
     let shader = stage.kernel.shader;
     let text = Text::of(stage).unwrap_or_else(|e| panic!("{name}: {e}"));

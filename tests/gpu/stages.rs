@@ -1,6 +1,6 @@
 //! The GPU backend against the CPU: every stage from identical input, on every buffer that it writes. Integers must be equal,
-//! scalars are compared with others of their column. Without an adapter the tests say so and go on, unless TRICOT_REQUIRE_ADAPTER
-//! is set.
+//! scalars are compared relative to their column. Without an adapter the tests say so and pass, unless TRICOT_REQUIRE_ADAPTER is
+//! set.
 
 use crate::common::{
     Random, advance, bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, reduced, with,
@@ -69,34 +69,34 @@ fn free() -> Value {
     )
 }
 
-/// What is allowed of the GPU against the CPU in f32, over the largest number of a column.
+/// Allowed difference between the GPU and the CPU in f32, over the largest number of a column.
 const ALLOWED: f64 = 2e-5;
-/// Where f32 itself is further off than that (fibre stress at small strain): a column of the GPU may be so many times further from
-/// f64 than that of the CPU in f32 is, both in the root mean square. That of few numbers is a matter of luck, see [`luck`], but a
-/// wrong one shows in the mean of many.
+/// Where f32 itself is less accurate (fibre stress at small strain), the error of a GPU column against f64 may be this many times
+/// that of the CPU in f32, both in the root mean square. For few numbers the ratio is a matter of luck, see [`luck`], but a fault
+/// shows in the mean of many.
 const ROUNDING: f64 = 1.5;
-/// Forces and stiffness of contact may differ by so many quanta: each part is rounded by itself, and the last corner of a face takes
-/// what rounding of the three others leaves.
+/// Forces and stiffness of contact may differ by this many quanta: each part is rounded by itself, and the last corner of a face
+/// takes the rounding remainder of the other three.
 const QUANTA: f64 = 3.0;
 
-/// How much the root mean squares of two lists of so many random numbers may differ by chance: each has a standard error of
-/// 1/√(2n), their ratio one of 1/√n; twice that.
+/// Chance difference of the root mean squares of two lists of `count` random numbers: each has a standard error of 1/√(2n), their
+/// ratio one of 1/√n; twice that is allowed.
 fn luck(count: usize) -> f64 {
     1.0 + 2.0 / (count as f64).sqrt()
 }
 
-/// How a number must agree.
+/// Rule by which a number must agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Rule {
-    /// It must be the same. That holds also of what rounding decides: which of two faces with a common edge is closest to a slave in
-    /// front of it, and whether a box that ends at the border of a cell is in the next one.
+    /// It must be the same, even where rounding decides: which of two faces with a common edge is closest to a slave node in
+    /// front of it, and whether a box that ends at the border of a cell is in the next cell.
     Equal,
-    /// Within rounding, for the others of this column, or within a number of quanta.
+    /// Within rounding relative to its column, or within a number of quanta.
     Column(usize, f64),
 }
 use Rule::{Column, Equal};
 
-/// What kind and access of a buffer do not tell. Without an exception, integers must be equal, and scalars have a column for each
+/// Rules beyond the kind and access of a buffer. Without an exception, integers must be equal, and scalars have a column for each
 /// number of an item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Exception {
@@ -114,11 +114,11 @@ enum Exception {
     Rounded(usize),
     /// Lists in any order, filled through counters.
     Lists,
-    /// Whole quanta of displacements, compared with the remainder: a quantum may be in either.
+    /// Whole quanta of displacements, compared together with the remainder: either may hold a quantum.
     Whole,
-    /// Boxes, whose last numbers are motion in whole quanta: which of two equally near ones is a matter of rounding.
+    /// Boxes, whose last numbers are motion in whole quanta: rounding decides between two equally near quanta.
     Boxes,
-    /// The remainder: what is compared is the change of both together.
+    /// The remainder: the change of both together is compared.
     Remainder,
     /// Flags, counts, and the bits of some f32, see [`status`].
     Status,
@@ -150,7 +150,7 @@ fn holds_bits(place: usize) -> bool {
     status::PENETRATION.contains(&place) || [status::TRAVEL, status::CONTACT_RATE, status::SPEED].contains(&place)
 }
 
-/// How the numbers of a buffer agree that a stage writes.
+/// Rules for the numbers of a buffer that a stage writes.
 fn rules(model: &Model, stage: &Stage, buffer: Buffer, access: Access) -> Vec<Rule> {
     let Description { name, kind, len, .. } = model.plan.buffers[buffer.0];
     let exception = exception(model, buffer);
@@ -182,7 +182,7 @@ fn rules(model: &Model, stage: &Stage, buffer: Buffer, access: Access) -> Vec<Ru
         let (plane, place) = (number / (len / planes), number % (len / planes));
         let column = plane * stride + place % stride / lanes % slots;
         let quanta = if exception == Some(Exception::Boxes) && column >= grid::MOTION { 1.0 } else { 0.0 };
-        // what belongs to no item of the stage stays as it is
+        // numbers of no item of the stage stay as they are
         if items.contains(&(place / stride)) { Column(column, quanta) } else { Equal }
     };
     let mut rules: Vec<Rule> = all(&rule);
@@ -204,7 +204,7 @@ fn split(mut slots: Vec<f64>, size: usize) -> Vec<f64> {
     slots
 }
 
-/// All stages, in an order in which what they read is there.
+/// All stages, in an order that fills buffers before they are read.
 fn stages(model: &Model) -> impl Iterator<Item = &Stage> {
     let plan = &model.plan;
     [&plan.search, &plan.diagnose, &plan.step, &plan.watch, &plan.collect].into_iter().flatten()
@@ -237,7 +237,7 @@ fn numbers(model: &Model, backend: &dyn Backend, buffer: Buffer) -> Vec<f64> {
     }
 }
 
-/// Lists of equal room, what is listed in ascending order.
+/// Sorts the entries of lists of equal capacity.
 fn sorted(mut lists: Vec<f64>, counts: &[u32]) -> Vec<f64> {
     let room = lists.len() / counts.len();
     for (list, count) in lists.chunks_exact_mut(room).zip(counts) {
@@ -246,12 +246,12 @@ fn sorted(mut lists: Vec<f64>, counts: &[u32]) -> Vec<f64> {
     lists
 }
 
-/// Whether two numbers are the same: not-a-number is so with itself, which is what bounds of empty lanes are.
+/// Whether two numbers are the same; NaN equals itself, as in the bounds of empty lanes.
 fn same(a: f64, b: f64) -> bool {
     a == b || a.is_nan() && b.is_nan()
 }
 
-/// Largest difference of numbers over the largest one there is; less than `quanta` is none.
+/// Largest difference of numbers over the largest number; differences below `quanta` count as none.
 fn difference(pairs: &[(f64, f64)], quanta: f64) -> f64 {
     let largest = pairs.iter().map(|(_, x)| x.abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
     let differing = pairs.iter().filter(|(a, b)| !same(*a, *b) && !((a - b).abs() <= quanta));
@@ -266,19 +266,19 @@ fn mean_square(pairs: &[(f64, f64)]) -> f64 {
     if sum.is_nan() { f64::INFINITY } else { sum / squares.count().max(1) as f64 }
 }
 
-/// What was found of one buffer of one stage.
+/// Findings on one buffer of one stage.
 #[derive(Default, Clone)]
 struct Found {
     /// Largest difference between the GPU and the CPU in f32, and numbers that differ.
     difference: f64,
     unequal: usize,
-    /// Largest differences of the GPU and of the CPU in f32 from the CPU in f64, and numbers that must be equal and that f64 has
-    /// otherwise: what rounding decides.
+    /// Largest differences of the GPU and of the CPU in f32 from the CPU in f64, and numbers that must be equal but differ in
+    /// f64, where rounding decides.
     from_f64: [f64; 2],
     decided: usize,
     /// Whether the stage has changed anything.
     changed: bool,
-    /// What is wrong, if anything is.
+    /// The fault, if any.
     wrong: Option<String>,
 }
 
@@ -307,7 +307,7 @@ impl Found {
             let from_f64 = [ours, theirs].map(|numbers| pairs(numbers, exact));
             found.difference = found.difference.max(worst);
             found.from_f64 = [0, 1].map(|i| found.from_f64[i].max(difference(&from_f64[i], quanta)));
-            // what all have the same, as the sums of beams that touch nothing, tells nothing
+            // numbers that agree everywhere, such as the sums of beams without contact, prove nothing
             let count = places.iter().filter(|i| [ours, theirs].iter().any(|of| !same(of[**i], exact[**i]))).count();
             let [gpu, cpu] = from_f64.map(|pairs| mean_square(&pairs).sqrt());
             if worst > ALLOWED && gpu > ROUNDING * luck(count) * cpu {
@@ -319,7 +319,7 @@ impl Found {
         found
     }
 
-    /// Notes what is wrong first.
+    /// Records the first fault.
     fn is_wrong(&mut self, message: impl FnOnce() -> String) {
         self.wrong.get_or_insert_with(message);
     }
@@ -337,7 +337,7 @@ impl Found {
     }
 }
 
-/// What was found by stage and buffer.
+/// Findings by stage and buffer.
 type Findings = BTreeMap<(&'static str, &'static str), Found>;
 
 /// Runs every stage of a plan on three backends from the state of a simulation.
@@ -350,7 +350,7 @@ fn compare(device: &Arc<Device>, simulation: &Simulation, findings: &mut Finding
     for buffer in (0..plan.buffers.len()).map(Buffer) {
         cpu.set_bytes(buffer, &simulation.backend().bytes(buffer));
     }
-    // what adds up over steps starts at zero: old sums would hide what this one adds
+    // running sums start at zero: old sums would hide the contribution of this stage
     for (buffer, access) in plan.collect.iter().flat_map(|stage| &stage.writes) {
         if *access == Access::Scatter && *buffer != model.totals.buffer {
             cpu.clear(*buffer);
@@ -436,7 +436,7 @@ fn every_stage_agrees_with_the_cpu_on_every_buffer() {
     assert!(unchanged.is_empty(), "nothing was changed in {unchanged:?}");
 }
 
-/// What is found wrong in a buffer that a stage of the coarse cell writes, after a change to some of its numbers.
+/// The fault found in a buffer that a stage of the coarse cell writes, after a change to some of its numbers.
 fn wrong(stage: &str, buffer: &str, number: impl Fn(usize) -> f64, change: impl FnOnce(&mut [f64])) -> Option<String> {
     static MODEL: LazyLock<Model> = LazyLock::new(|| {
         run::simulation(&loaded(&coarse_cell()), BackendConfig { threads: 1, ..BackendConfig::default() })
@@ -522,7 +522,7 @@ fn a_column_may_round_as_far_as_the_cpu_does() {
     let mut random = Random(1);
     let mut noise = |size: f64| -> Vec<f64> { (0..1000).map(|_| 1.0 + size * random.draw()).collect() };
     let (exact, theirs, ours, far) = (noise(0.0), noise(1e-3), noise(1e-3), noise(2e-3));
-    // a column that rounds as much does not excuse one that should not
+    // a column with large rounding does not excuse one that should have little
     let rules: Vec<Rule> = (0..1000).map(|place| Column(place % 2, 0.0)).collect();
     let wrong = |ours: &[f64], theirs: &[f64]| Found::new(&rules, [ours, theirs, &exact]).wrong.is_some();
     assert!(!wrong(&ours, &theirs) && wrong(&far, &theirs));

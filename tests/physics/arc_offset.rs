@@ -1,4 +1,5 @@
-//! Threads that bend around threads: as long as the arc, however few beams, and forces that are the gradient of an energy.
+//! Threads that bend around threads: their length is that of the arc, however few the beams, and forces are the gradient of an
+//! energy.
 
 use crate::common::{advance, bare, below, momenta, near, norm, positions, start, with};
 use serde_json::{Value, json};
@@ -60,8 +61,8 @@ fn even(beams: usize) -> Vec<f64> {
     (0..=beams).map(|i| PI * i as f64 / beams as f64).collect()
 }
 
-/// Mean tension over that of a thread along the arc, which lies as deep in the other as the force of each beam, which crosses it, asks.
-/// F = k 4/3 √(4r) δ^3/2.
+/// Mean tension over that of a thread along the arc, whose depth δ in the other thread follows from the force of each crossing
+/// beam: F = k 4/3 √(4r) δ^3/2.
 fn tension(angles: &[f64], precision: Precision) -> f64 {
     let mut simulation = tightened(angles, precision);
     let rest: f64 = positions(&simulation)[..simulation.mesh().threads[0].count]

@@ -21,8 +21,8 @@ fn scene(thread: Value, conditions: Value) -> Value {
     with(bare(), &[("/domain/mesh/threads", json!([thread])), ("/domain/mesh/conditions", conditions)])
 }
 
-/// Nodes at equal distances from 0 to `length` along x. Behind a clamped end sits a very short beam that is held: the bend at
-/// the clamp then has half a beam on its free side and nothing on the other.
+/// Nodes at equal distances from 0 to `length` along x. A very short held beam lies behind a clamped end: the bend at the clamp
+/// then has half a beam on its free side and nothing on the other.
 fn line(length: f64, beams: usize, clamped: [bool; 2]) -> Vec<[f64; 3]> {
     let short = 0.002 * length / beams as f64;
     let mut x: Vec<f64> = (0..=beams).map(|i| length * i as f64 / beams as f64).collect();
@@ -35,7 +35,7 @@ fn line(length: f64, beams: usize, clamped: [bool; 2]) -> Vec<[f64; 3]> {
     x.into_iter().map(|x| [x, 0.0, 0.0]).collect()
 }
 
-/// Time in which bending of a beam length takes its longest stable step, s.
+/// Longest stable time step for the bending of beams of this length, s.
 fn bending_step(beam: f64) -> f64 {
     0.5 * beam * beam * (TEX * 1e-12 / BENDING).sqrt()
 }
@@ -135,7 +135,7 @@ fn a_thread_buckles_at_its_euler_load() {
     }
 }
 
-/// A thread that closes to a circle but for its last beam.
+/// A circular thread without its last beam.
 fn circle(beams: usize, radius: f64, rest_curvature: f64) -> Value {
     let nodes: Vec<[f64; 3]> = (0..beams)
         .map(|i| 2.0 * PI * i as f64 / beams as f64)
@@ -271,7 +271,7 @@ fn a_ring_moves_and_shrinks_freely() {
     }
 }
 
-/// What is tightened is thread along the curve, not the chords that stand for it.
+/// Tightening acts on the arc length of the thread, not on the chords of its beams.
 #[test]
 fn a_thread_is_as_long_as_its_curve() {
     const EXCESS: f64 = 0.02;

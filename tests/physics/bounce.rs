@@ -37,12 +37,13 @@ struct Falling {
     precision: Precision,
 }
 
-/// So limp that they store nothing: what is not kinetic is in contact.
+/// So limp that they store no energy: all non-kinetic energy is in contact.
 const LIMP: [f64; 2] = [1e-3, 0.0];
-/// Of the stitch.
+/// Values of the stitch.
 const STITCH: [f64; 2] = [11.0, 5.6e-4];
 
-/// Energies after over before: kinetic; with what threads store; with what contact damping took; and the most that contact held.
+/// Energies after over before: kinetic; with the strain energy of threads; with the loss to contact damping; and the largest
+/// energy of contact.
 struct Bounced {
     kinetic: f64,
     stored: f64,
@@ -73,7 +74,7 @@ impl Falling {
         )
     }
 
-    /// Until they have parted, or lie on each other.
+    /// Runs until the threads have parted or rest on each other.
     fn bounce(&self) -> Bounced {
         let mut simulation = start(&self.case(), self.precision);
         let step = bounce_time() / self.steps;
@@ -128,7 +129,7 @@ fn threads_that_fall_on_each_other_keep_their_energy() {
     below("threads of the stitch: energy lost or made", stiff_lost, 0.01);
 }
 
-/// What damping takes is noted in full as steps become short.
+/// The recorded loss to damping becomes complete as steps become short.
 #[test]
 fn a_damped_bounce_loses_energy_and_its_loss_is_noted() {
     let mut wrong = Vec::new();

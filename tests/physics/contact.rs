@@ -179,8 +179,8 @@ fn pressure_through_meshes_that_do_not_match() {
     }
 }
 
-/// Moves a thread past a slab that is held, from out of reach to out of reach or from on it, and compares the force on its first
-/// node with what the whole surface does to the points of its beam. At some places the node must be `beyond` the faces.
+/// Moves a thread past a held slab, starting and ending out of reach or starting on it, and compares the force on its first node
+/// with the force of the whole surface on the points of its beam. At some places the node must be `beyond` the faces.
 fn pass(what: &str, slab: Value, nodes: [[f64; 3]; 2], moved: [f64; 3], beyond: fn([f64; 3]) -> bool) {
     let (radius, penalty) = (0.2, 50.0);
     let thread =

@@ -1,5 +1,5 @@
-//! Effective shear angles of a bias-extension specimen in the trellis kinematics of the three-zone theory, where every
-//! angle is known, and of a tightened cell, where the angle that is prescribed is known.
+//! Effective shear angles of a bias-extension specimen in the trellis kinematics of the three-zone theory, where every angle is
+//! known, and of a tightened cell, whose prescribed angle is known.
 
 use crate::common::{advance, below, loaded, near};
 use serde_json::{Value, json};
@@ -78,8 +78,8 @@ fn yarn(mesh: &mut Mesh, ply: Ply, slices: usize, at: impl Fn(f64, f64) -> [f64;
     });
 }
 
-/// The specimen pulled without slip until zone C has sheared by `angle`. The direction of a rising yarn at a point depends
-/// on the falling yarn there alone: it is turned where that one is held by no clamp.
+/// The specimen pulled without slip until zone C has sheared by `angle`. The direction of a rising yarn at a point depends on the
+/// falling yarn there alone: it is turned where no clamp holds that falling yarn.
 fn pulled(mesh: &Mesh, angle: f64) -> Frame {
     let c = 0.5f64.sqrt();
     let free = c * (LENGTH - WIDTH);

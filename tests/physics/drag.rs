@@ -1,24 +1,24 @@
-//! A thread without friction that is drawn around the edge of a yarn slides as it should: what one end feels is what the other is drawn
-//! with, wherever nodes and faces lie.
+//! A frictionless thread drawn around the edge of a yarn slides freely: the tension at one end equals the pull at the other,
+//! wherever nodes and faces lie.
 
 use crate::common::{advance, bare, below, neo_hookean, positions, shaped, start, with};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use tricot::settings::integration::Precision::F32;
 
-/// Of the shipped weft: a truncated ellipse of this width and thickness, whose cut sides are so high, mm.
+/// The shipped weft: a truncated ellipse of this width, thickness and height of the cut sides, mm.
 const WEFT: [f64; 2] = [2.08, 0.378];
 const SIDE: f64 = 0.059;
-/// Of the shipped stitch: radius, mm; EA, N; bending stiffness, N·mm².
+/// The shipped stitch: radius, mm; EA, N; bending stiffness, N·mm².
 const RADIUS: f64 = 0.1;
 const AXIAL: f64 = 11.0;
 const BENDING: f64 = 5.6e-4;
-/// Tension, N, about.
+/// Approximate tension, N.
 const TENSION: f64 = 0.05;
-/// Length of a leg, mm, and how far its end is above or below the middle of the weft.
+/// Length of a leg, and distance of its end from the middle of the weft, mm.
 const LEG: f64 = 12.0;
 const RISE: f64 = 3.0;
-/// Distance that the thread is drawn, mm, and how much of it is not judged, since the legs still swing.
+/// Distance that the thread is drawn, and its first part, which is not judged since the legs still oscillate, mm.
 const DRAWN: f64 = 1.0;
 const START: f64 = 0.25;
 
@@ -62,7 +62,7 @@ fn around(beam: f64, angle: f64) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// Root mean square of the resistance over the tension, of a thread that is drawn by one end.
+/// Root mean square of the resistance over the tension, for a thread drawn by one end.
 fn resistance(beam: f64, degrees: f64) -> f64 {
     let angle = degrees.to_radians();
     let nodes = around(beam, angle);

@@ -1,5 +1,5 @@
-//! Effects cost nothing where they are absent: a scene without one has no trace of it in its plan, and one whose coefficient is
-//! zero moves as if it were not there.
+//! Absent effects cost nothing: a scene without an effect has no trace of it in its plan, and a scene whose coefficient is zero
+//! moves as if the effect were absent.
 
 use crate::common::{advance, bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, with};
 use serde_json::{Value, json};
@@ -55,8 +55,8 @@ fn cell() -> Value {
     with(coarse_cell(), &[("/integration", integration)])
 }
 
-/// Every line by which an effect shows in a plan: names of stages and buffers, and the statements of shaders. Comments and the
-/// declarations of what all stages of a kind are given (rows, parameters) are no trace.
+/// Every line by which an effect shows in a plan: names of stages and buffers, and the statements of shaders. Comments and
+/// declarations common to all stages of a kind (rows, parameters) do not count.
 fn lines(simulation: &Simulation) -> Vec<String> {
     let plan = &simulation.model.plan;
     let mut found: Vec<String> = plan.buffers.iter().map(|b| format!("buffer {}", b.name)).collect();
@@ -76,7 +76,7 @@ fn lines(simulation: &Simulation) -> Vec<String> {
     found
 }
 
-/// An effect: what its traces are, a scene with it, and what that scene is without it.
+/// An effect: its traces, a scene with it, and the same scene without it.
 struct Absent {
     effect: &'static str,
     traces: &'static [&'static str],
@@ -255,7 +255,7 @@ fn without_friction_contact_keeps_less() {
     assert_eq!(bytes(&rough, &sums) / 14, bytes(&smooth, &sums) / 12);
 }
 
-/// Energies by mode and all other diagnosis are looked at between steps, and leave no trace in the state.
+/// Energies by mode and all other diagnostics are computed between steps, and leave no trace in the state.
 #[test]
 fn what_is_only_looked_at_is_no_part_of_a_step() {
     for case in [cell(), free()] {
@@ -278,7 +278,7 @@ fn moved(simulation: &Simulation) -> Vec<[f64; 3]> {
     [simulation.fluctuations(), simulation.velocities()].concat()
 }
 
-/// Runs two scenes side by side and compares where everything is, to the last bit, and how fast.
+/// Runs two scenes side by side and compares positions and velocities bit by bit.
 #[track_caller]
 fn same(effect: &str, mut with: Simulation, mut without: Simulation, until: f64) {
     for simulation in [&mut with, &mut without] {
@@ -295,7 +295,7 @@ fn same(effect: &str, mut with: Simulation, mut without: Simulation, until: f64)
 /// So small that it is zero in f32: the effect is on, and its coefficient vanishes.
 const VANISHES: f64 = 1e-60;
 
-/// A scene with a coefficient that vanishes beside the scene without the effect.
+/// A scene with a vanishing coefficient beside the scene without the effect.
 #[track_caller]
 fn vanishes(effect: &str, scene: &Value, on: &[(&str, Value)], off: &[(&str, Value)]) {
     let [with, without] = [on, off].map(|changes| loaded(&with(scene.clone(), changes)));
@@ -335,7 +335,7 @@ fn a_coefficient_of_zero_is_no_effect() {
     vanishes("contact mass", &cell, &[("/effects/contact_mass", mass)], &[("/effects/contact_mass", Value::Null)]);
 }
 
-/// Coefficients that the range of a case keeps from zero.
+/// Coefficients that the ranges of a case keep above zero.
 #[test]
 fn a_coefficient_of_zero_that_no_case_may_have_is_no_effect_either() {
     let altered = |scene: &Value, change: &dyn Fn(&mut Loaded)| {
@@ -429,7 +429,7 @@ fn bodies_too_far_apart_have_no_candidates_and_move_as_without_contact() {
     same("contact of what is far apart", on, off, 1.5e-4);
 }
 
-/// A free scene in a cell so large that it does not notice.
+/// A free scene in a cell too large to influence it.
 #[test]
 fn periodicity_without_deformation_is_none() {
     let loaded = loaded(&free());
@@ -445,7 +445,7 @@ fn periodicity_without_deformation_is_none() {
     }
 }
 
-/// A floor on mass that no node is below.
+/// A mass floor that no node is below.
 #[test]
 fn a_mass_floor_that_vanishes_is_none() {
     let floor = |share: f64| simulation(&loaded(&with(cell(), &[("/effects/mass_floor", json!(share))])), F32);

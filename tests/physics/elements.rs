@@ -16,7 +16,7 @@ fn scene(blocks: Value) -> Value {
     with(bare(), &[("/domain/mesh/blocks", blocks), ("/integration", json!({ "dt_s": 1e-9, "energy_tolerance": 100 }))])
 }
 
-/// A kind of hexahedra, and how a case gets it.
+/// A kind of hexahedra, and the change of a case that selects it.
 type Hexahedra = (&'static str, fn(Value) -> Value);
 /// Both kinds.
 const HEXAHEDRA: [Hexahedra; 2] = [("full", |case| case), ("reduced", reduced)];
@@ -89,8 +89,8 @@ fn patch_an_affine_displacement_gives_uniform_stress() {
                     inner = inner.max(norm(*f));
                 }
             }
-            // the force on the half beyond a cut: the nodes of the face at x = 3 carry −P N A less what the sides carry; over
-            // the whole border virtual power with a linear field gives V P exactly
+            // the force on the half beyond a cut: the nodes of the face at x = 3 carry −P N A less the share of the sides; over
+            // the whole border, virtual power with a linear field gives V P exactly
             let mut virial = [[0.0; 3]; 3];
             for (x, f) in nodes.iter().zip(&forces) {
                 for i in 0..3 {
@@ -164,7 +164,7 @@ fn rigid_motion_gives_no_force() {
             };
             simulation.set_fluctuations(&nodes.iter().map(|x| shift(*x)).collect::<Vec<_>>());
             let force = forces(&mut simulation).into_iter().map(norm).fold(0.0, f64::max);
-            // of what one per cent of fibre stretch gives on the area of a node
+            // relative to the force of one per cent of fibre stretch on the area of a node
             let scale = 0.01 * 108_500.0 * 0.25;
             println!(
                 "{name}: {angle:.2} rad and {far} mm away: force {force:.1e} N, {:.1e} of that at 1 % strain",
@@ -254,7 +254,7 @@ fn a_free_chain_of_beams_keeps_its_momenta() {
     }
 }
 
-/// Largest less smallest energy of a vibrating block, over the largest, at whole steps.
+/// Largest less smallest energy of a vibrating block at whole steps, over the largest.
 fn energy_spread(dt: f64, steps: usize) -> f64 {
     let case = with(
         scene(json!([block("b", [2, 2, 2], [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]], DENSITY, neo_hookean(1000.0, 0.3))])),
@@ -289,7 +289,7 @@ fn elastic_energy_drifts_with_the_square_of_the_step() {
     near("order of the energy error, coarser pair", (coarse / middle).log2(), 2.0, 0.1);
 }
 
-/// Growth of the velocity of a bar (held sideways) in some steps of a multiple of L/c.
+/// Growth of the velocity of a laterally held bar in some steps of a multiple of L/c.
 fn bar_growth(material: Value, speed: f64, factor: f64) -> f64 {
     let length = 0.5;
     let case = with(
@@ -338,7 +338,7 @@ fn a_bar_steps_stably_up_to_length_over_wave_speed() {
     }
 }
 
-/// Force on the far end of a yarn that is held at one end and moved at the other.
+/// Force on the far end of a yarn held at one end and moved at the other.
 fn bent_yarn(lines: Value, dt: f64, precision: Precision) -> tricot::error::Result<[f64; 3]> {
     let yarn = block("yarn", [12, 3, 2], [[0.0; 3], [9.6, 2.0, 0.4]], 1.16e-9, charmetant());
     let case = with(

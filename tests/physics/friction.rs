@@ -11,7 +11,7 @@ const GRAVITY: f64 = 9810.0;
 /// Heavy blocks press hard enough for a soft penalty and take long steps.
 const DENSITY: f64 = 1e-6;
 
-/// A block on a plane that is tilted about y, pressed in as far as its weight will press it.
+/// A block on a plane tilted about y, with the initial penetration that its weight produces.
 fn incline(degrees: f64, damping: Value, precision: Precision) -> Simulation {
     let (sine, cosine) = degrees.to_radians().sin_cos();
     let ground = block("ground", [15, 13, 1], [[-4.0, -4.0, -1.0], [8.0, 4.0, 0.0]], DENSITY, neo_hookean(1000.0, 0.3));
@@ -25,7 +25,7 @@ fn incline(degrees: f64, damping: Value, precision: Precision) -> Simulation {
             ("/effects/contact", json!({})),
             ("/effects/damping", damping),
             ("/effects/gravity_mm_s2", json!([GRAVITY * sine, 0.0, -GRAVITY * cosine])),
-            // the energy of the overlap that it starts with has no source
+            // the energy of the initial overlap has no source
             ("/integration", json!({ "dt_s": 4e-6, "energy_tolerance": 100 })),
         ],
     );
@@ -110,7 +110,7 @@ fn just_above_its_limit_a_block_slides() {
     near("acceleration at 30°, m/s²", GRAVITY * (0.5 - FRICTION * 0.75f64.sqrt()) * 1e-3, 3.2059, 1e-4);
 }
 
-/// Tension behind over tension before a drum that a thread is pulled over.
+/// Tension after over tension before a drum over which a thread is pulled.
 fn capstan(friction: f64, wrap: f64, columns: usize, beam: f64) -> f64 {
     let (drum, radius, leg) = (5.0, 0.1, 2.0);
     let half = shaped("drum", [2, columns, 1], DENSITY, neo_hookean(1000.0, 0.3), |t| {
@@ -187,7 +187,7 @@ fn a_thread_around_a_drum_follows_the_capstan_law() {
             near(&format!("tension ratio over {name}, {columns} faces, beams of {beam} mm"), ratio, expected, allowed);
         }
     }
-    // faces and beams that come and go are felt, the less the finer both are
+    // faces and beams that enter and leave contact are felt, less so with finer meshes
     for (wrap, columns, beam, allowed) in [(FRAC_PI_2, 60, 0.2, 2e-3), (PI, 120, 0.15, 5e-4)] {
         let ratio = capstan(0.0, wrap, columns, beam);
         near(&format!("tension ratio without friction, {columns} faces"), ratio, 1.0, allowed);

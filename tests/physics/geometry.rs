@@ -126,7 +126,7 @@ fn sixty_graded_beams_a_lap_stay_clear() {
     assert!((length - 106.3).abs() < 0.5, "{length}");
 }
 
-/// However few beams stand for it, a thread is as long as its path.
+/// A thread is as long as its path, however few its beams.
 #[test]
 fn a_thread_is_as_long_as_its_path() {
     let lengths = [60, 90, 1200].map(|beams| {
@@ -338,7 +338,7 @@ fn shipped_fabrics_build_and_report() {
     }
 }
 
-/// Wherever nodes come to lie, no thread starts in touch with a yarn: the contact would throw it away.
+/// Wherever nodes lie, no thread starts in contact with a yarn: contact would throw it away.
 #[test]
 fn shipped_threads_start_clear_of_yarns() {
     let shipped: Value = serde_json::from_str(include_str!("../../cases/fabrics/px35.json")).unwrap();
@@ -401,7 +401,7 @@ fn what_cannot_be_built_is_refused_with_its_field() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
 
-    /// Whatever the sizes, a fabric is refused, or built whole: well-shaped, finite, interlocked.
+    /// Whatever the sizes, a fabric is refused, or built completely: well-shaped, finite, interlocked.
     #[test]
     fn any_fabric_is_built_or_refused(
         pitch in [1.0..12.0, 1.0..12.0],

@@ -1,4 +1,4 @@
-//! Weight is that of the true mass, whatever mass a scene adds for its time step.
+//! Gravity acts on the true mass, whatever mass a scene adds for its time step.
 
 use crate::common::{advance, bare, block, near, neo_hookean, start, with};
 use serde_json::{Value, json};
@@ -7,8 +7,8 @@ use tricot::settings::integration::Precision::{self, F32, F64};
 /// So strong that a light thread presses as in a fabric, mm/s².
 const GRAVITY: f64 = 1e7;
 
-/// A thread that lies on a plate, which is held at its bottom. Contact adds mass, and the floor makes edges of the plate and ends of
-/// the thread heavier.
+/// A thread that lies on a plate, which is held at its bottom. Contact adds mass, and the mass floor makes edges of the plate and
+/// ends of the thread heavier.
 fn scene() -> Value {
     let plate = block("plate", [6, 6, 2], [[-1.5, -1.5, -1.0], [1.5, 1.5, 0.0]], 2e-9, neo_hookean(1000.0, 0.3));
     let nodes: Vec<[f64; 3]> = (0..=8).map(|i| [0.25 * f64::from(i) - 1.0, 0.1, 0.1]).collect();
@@ -33,7 +33,7 @@ fn scene() -> Value {
     )
 }
 
-/// What the ground carries, N, and true weight and weight of all mass that acts, N.
+/// Reaction of the ground, true weight, and weight of all acting mass, N.
 fn carried(precision: Precision) -> [f64; 3] {
     let mut simulation = start(&scene(), precision);
     advance(&mut simulation, 1e-3);

@@ -1,4 +1,4 @@
-//! Guards, provoked: each stops the run, names its cause, and what to change.
+//! Guards, provoked: each stops the run, and names the cause and the remedy.
 
 use crate::common::{bare, block, charmetant, neo_hookean, start, with};
 use serde_json::{Value, json};
@@ -7,7 +7,7 @@ use tricot::error::{Error, Guard};
 use tricot::settings::integration::Precision::{F32, F64};
 use tricot::simulate::Simulation;
 
-/// Goes on until a guard stops the run, which it must by that time.
+/// Runs until a guard stops the run, which must happen by the given time.
 #[track_caller]
 fn stopped(simulation: &mut Simulation, until: f64) -> Guard {
     match simulation.advance(until, |_| false) {
@@ -63,7 +63,7 @@ fn a_hexahedron_turned_inside_out() {
     assert!(guard.culprit.contains("hexahedron 0 of yarn"), "{guard}");
 }
 
-/// Rounding in f32 lets the energy of a stiff part drift, which in f64 is kept.
+/// Rounding in f32 lets the energy of a stiff part drift; f64 conserves it.
 #[test]
 fn an_energy_that_drifts_is_told_from_one_that_explodes() {
     let nodes: Vec<[f64; 3]> = (0..=50).map(|i| [0.2 * f64::from(i), 0.0, 0.0]).collect();

@@ -1,5 +1,5 @@
-//! Hexahedra with one integration point: which deformations they resist and how much, whether their energy is that of their
-//! forces, how they bend beside fully integrated ones, and that nothing is left of them where they are not chosen.
+//! Hexahedra with one Gauss point: the deformations that they resist and their stiffness, consistency of energy and forces,
+//! bending beside fully integrated ones, and no trace of them where they are not chosen.
 
 use crate::common::{
     Random, advance, bare, below, block, charmetant, coarse_cell, near, neo_hookean, reduced, shaped, start, with,
@@ -48,7 +48,8 @@ fn nodes(case: &Value) -> Displacements {
     start(case, F64).mesh().nodes.clone()
 }
 
-/// Independent columns of a square matrix, by elimination with the largest pivot; what is left is below a share of the first.
+/// Number of independent columns of a square matrix, by elimination with the largest pivot, and the largest remainder over the
+/// first pivot.
 fn rank(mut a: Vec<Vec<f64>>) -> (usize, f64) {
     let n = a.len();
     let mut first = 0.0;
@@ -172,7 +173,7 @@ fn energy_is_the_work_of_the_forces() {
     }
 }
 
-/// Force at the tip of a clamped bar over that of Timoshenko's theory, with `layers` hexahedra through its thickness.
+/// Tip force of a clamped bar over that of Timoshenko's theory, with `layers` hexahedra through its thickness.
 fn cantilever(layers: usize, change: fn(Value) -> Value) -> (f64, f64) {
     let (length, young, down) = (8.0, 1000.0, 0.05);
     let bar =
@@ -289,7 +290,7 @@ fn the_estimated_step_is_stable_whatever_the_coefficient() {
     assert!(steps[2] < 0.5 * steps[1], "stiff control does not shorten the step");
 }
 
-/// A yarn on fibre lines whose edges along the fibre are turned up and down in turn, let go with a small kick.
+/// A yarn on fibre lines whose edges along the fibre turn up and down alternately, released with a small kick.
 fn tilted(tilt: f64, integration: Value) -> Simulation {
     let yarn = block("yarn", [16, 4, 2], [[0.0; 3], [4.8, 1.2, 0.4]], DENSITY, charmetant());
     let changes = [("/effects/fibre_lines", json!({})), ("/integration", integration)];
@@ -306,7 +307,7 @@ fn tilted(tilt: f64, integration: Value) -> Simulation {
     simulation
 }
 
-/// Fibre lines add inertia along their segments, an element is stiff along its mean fibre.
+/// Fibre lines add inertia along their segments, whereas an element is stiff along its mean fibre.
 #[test]
 fn the_estimated_step_is_stable_where_edges_turn_away_from_the_fibre() {
     let limits = [0.0, 0.1].map(|tilt| {

@@ -1,4 +1,4 @@
-//! The solver against answers that are known: closed forms, balances, symmetries, differences of energies.
+//! The solver against known answers: closed forms, balances, symmetries, differences of energies.
 
 #[path = "../common/mod.rs"]
 mod common;

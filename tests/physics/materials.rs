@@ -1,5 +1,5 @@
-//! Every law against its energy, its symmetries and closed forms; the fibre law against values in high precision.
-//! A new law gets a row in [`laws`] and inherits everything that is not about one law alone.
+//! Every law against its energy, its symmetries and closed forms; the fibre law against values in high precision. A new law gets
+//! a row in [`laws`] and inherits all tests that are not specific to one law.
 
 use crate::common::{Random, below, near, norm};
 use std::marker::PhantomData;
@@ -173,7 +173,7 @@ fn the_fibre_law_meets_its_reference_values() {
         for (worst, (error, whole)) in
             worst.iter_mut().zip([s11, (error[1], whole[1]), ((energy - r.w).abs(), r.w.abs())])
         {
-            // 1e-15 MPa is what an unloaded cross-section may keep
+            // an unloaded cross-section may keep 1e-15 MPa
             let relative = (error - 1e-15).max(0.0) / whole.max(1e-300);
             if relative > worst.0 {
                 *worst = (relative, &r.name);
@@ -341,8 +341,8 @@ fn every_instruction_set_gives_the_same_bits() {
     }
 }
 
-/// What single precision costs, by size of strain, at rest orientation and turned by 30°. The state is rounded first: the
-/// numbers show the arithmetic of the law, not the rounding of its input.
+/// Error of single precision by size of strain, unrotated and rotated by 30°. The state is rounded first, so the numbers show the
+/// arithmetic of the law, not the rounding of its input.
 #[test]
 fn single_precision_keeps_small_strains() {
     let law = row::<Charmetant>("charmetant", false, px35(1e-3));

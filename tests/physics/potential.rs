@@ -1,4 +1,4 @@
-//! Contact of points with closed surfaces is the gradient of one energy, however the surface is cut into faces.
+//! The contact force of points on closed surfaces is the gradient of one energy, however the surface is cut into faces.
 
 use crate::common::{Random, below, block, cross, loaded, neo_hookean, norm, shaped, with};
 use serde_json::{Value, json};
@@ -25,7 +25,7 @@ struct Scene {
     penalty: f64,
 }
 
-/// What contact does at some place of the points.
+/// Contact results at one position of the points.
 struct Seen {
     /// Energy and force on each point.
     energies: Vec<f64>,
@@ -176,7 +176,7 @@ fn the_force_is_the_gradient_of_the_energy() {
             for i in 0..count {
                 let slope = (ahead.energies[i] - back.energies[i]) / (2.0 * step);
                 let turns = norm([0, 1, 2].map(|k| ahead.forces[i][k] - back.forces[i][k])) > 0.02 * largest;
-                // deep inside, what is nearest changes across the medial axis: there is no gradient there
+                // deep inside, the nearest face changes across the medial axis, where there is no gradient
                 if heights[1] < 0.0 && turns {
                     kinks += 1;
                     continue;
@@ -223,8 +223,7 @@ fn a_flat_surface_pushes_alike_however_it_is_cut() {
     }
 }
 
-/// A way from over one face to over the next ones, by faces with a common edge, such that all are visited: places `high` over the
-/// middles of faces and of edges.
+/// A path over all faces, from face to face across common edges: positions `high` over the middles of faces and edges.
 fn way(scene: &Scene, high: f64) -> Vec<[f64; 3]> {
     let mesh = &scene.simulation.mesh();
     let faces: Vec<[usize; 4]> =
@@ -247,7 +246,7 @@ fn way(scene: &Scene, high: f64) -> Vec<[f64; 3]> {
     let (mut here, mut left) = (0, (1..faces.len()).collect::<Vec<_>>());
     let mut places = vec![over(&faces[0], normal(0))];
     while !left.is_empty() {
-        // the shortest way to a face that is left
+        // the shortest path to a remaining face
         let mut from = vec![None; faces.len()];
         let mut queue = std::collections::VecDeque::from([here]);
         let mut to = here;
@@ -314,7 +313,7 @@ fn a_path_over_a_body_returns_its_energy() {
     below("work along the way against the energy, over ½ k r²", worst / unit, 1e-6);
 }
 
-/// What is pushed against a cut end is stopped by its cap.
+/// The cap of a cut end stops a body pushed against it.
 #[test]
 fn a_cap_pushes_along_the_fibre() {
     let yarn = block("yarn", [4, 3, 2], [[0.0, 0.0, 0.0], [1.25, 1.0, 0.5]], 1e-9, neo_hookean(10.0, 0.3));

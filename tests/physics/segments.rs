@@ -1,5 +1,5 @@
 //! Contact of two segments as the gradient of one energy: forces against differences of the energy, any mesh on either side, and
-//! the energy that comes back along a path.
+//! energy conservation along a closed path.
 
 use crate::common::{Random, below, cross, near, norm};
 use tricot::contact::segments::{Push, Segments};
@@ -36,7 +36,7 @@ fn forces(push: &Push<f64>) -> [Vector; 4] {
     [push.own[0], push.own[1], push.others[0], push.others[1]]
 }
 
-/// The smallest distance of two segments by trying all.
+/// The smallest distance of two segments by brute force.
 fn distance_by_trial(x: [Vector; 4], tries: usize) -> f64 {
     let at = |a: Vector, b: Vector, i: usize| fma(sub(b, a), i as f64 / tries as f64, a);
     let all = (0..=tries).flat_map(|i| (0..=tries).map(move |j| (i, j)));
@@ -252,7 +252,7 @@ fn a_path_around_a_bent_thread_gives_its_energy_back() {
         for ends in stations.windows(2) {
             let step = [0, 1].map(|k| (ends[1][k] - ends[0][k]) / STEPS as f64);
             for i in 0..STEPS {
-                // two points of Gauss a step
+                // two Gauss points per step
                 for point in [0.5 - 0.5 / 3.0f64.sqrt(), 0.5 + 0.5 / 3.0f64.sqrt()] {
                     let at = [0, 1].map(|k| ends[0][k] + (i as f64 + point) * step[k]);
                     let (energy, force, _) = chains(&place(at), &chain);

@@ -1,4 +1,4 @@
-//! The specimen cut out of the fabric: its yarns, its threads, its clamps, and what they do in a short run.
+//! The specimen cut from the fabric: its yarns, threads and clamps, and their motion in a short run.
 
 use serde_json::{Value, json};
 use std::path::Path;
@@ -163,7 +163,7 @@ fn threads_are_cut_in_the_border_and_bind_whole_loops() {
     }
 }
 
-/// Where laps differ in their beams, every piece of thread has as many as where all are alike, cut laps too.
+/// Where laps differ in their beams, every piece of thread, cut laps included, has as many beams as where all laps are alike.
 #[test]
 fn pieces_keep_their_beams_where_laps_differ() {
     for sets in [["domain.specimen.warp_angle_deg=45"], ["domain.specimen.warp_angle_deg=90"]] {
@@ -209,7 +209,7 @@ fn threads_start_no_deeper_in_anything_than_those_of_the_cell() {
         println!("{samples} samples a beam: cell {cell:.4?}, specimen {small:.4?}");
         assert!((0..3).all(|i| small[i] > cell[i] - 1e-3));
     }
-    // nodes are what contact sees
+    // contact acts on nodes
     let shipped = gaps(&mesh(&loaded(SMALL, &[])), 1);
     assert!(shipped.iter().all(|gap| *gap > -0.002), "{shipped:?}");
 }

@@ -1,4 +1,4 @@
-//! Control of a cell along its fibre directions: stretches, membrane forces and their work beside closed forms.
+//! Control of a cell along its fibre directions: stretches, membrane forces and their work against closed forms.
 
 use crate::common::{advance, below, loaded, near, start, with};
 use serde_json::{Value, json};
@@ -8,7 +8,7 @@ use tricot::mesh::quality;
 use tricot::settings::integration::Precision;
 use tricot::simulate::Simulation;
 
-/// A cell whose bodies do not touch: straight yarns, which nothing bends.
+/// A cell without contact: straight yarns that nothing bends.
 fn straight(steps: Value) -> Value {
     with(
         crate::common::coarse_cell(),
@@ -75,8 +75,8 @@ fn a_membrane_force_is_reached_and_kept() {
     }
 }
 
-/// Sheared to either side, the fibres of a cell that is driven at its corner have the force F_nor (1 + sin γ), not the one that
-/// they are held with.
+/// Sheared to either side, the fibres of a cell driven at its corner carry the force F_nor (1 + sin γ), not the force of held
+/// fibres.
 #[test]
 fn a_corner_driven_cell_pulls_its_fibres_by_the_force_at_its_corner() {
     let run = |angle: f64, how: Value| {
@@ -124,7 +124,7 @@ fn a_stretch_without_effect_is_refused() {
     std::fs::write(&path, case.to_string()).unwrap();
     let message = tricot::rigs::read::read(&path, &[]).unwrap_err().to_string();
     assert!(message.contains("steps.0: both directions are so already"), "{message}");
-    // held again is something else than driven
+    // held again differs from driven
     loaded(&straight(json!([
         { "stretch": { "warp": "corner_driven", "time_s": 1e-4 } }, { "stretch": { "time_s": 1e-4 } }
     ])));

@@ -1,5 +1,5 @@
-//! The limit of the time step: measured by power iteration against a chain whose limit is known and against steps that are too long,
-//! and the estimate that runs follow against it, in the states that are hard to estimate.
+//! The limit of the time step: measured by power iteration, against a chain of known limit and against unstable steps; and the
+//! estimate that runs follow, against the measured limit in states that are hard to estimate.
 
 use crate::common::{advance, bare, block, charmetant, coarse_cell, loaded, near, neo_hookean, start, with};
 use serde_json::{Value, json};
@@ -10,7 +10,7 @@ use tricot::settings::integration::Precision::{F32, F64};
 use tricot::simulate::{BackendConfig, Simulation};
 use tricot::study::step::{State, longest_step, measure};
 
-/// Measures a state, prints it, and fails if the estimate is not between a share of the limit and all of it.
+/// Measures a state, prints it, and fails unless the estimate lies between a share of the limit and the limit.
 #[track_caller]
 fn check(what: &str, scene: &mut Simulation, share: f64) -> State {
     let state = measure(scene).unwrap();
@@ -55,7 +55,7 @@ fn the_measured_limit_of_a_chain_is_exact() {
     assert!(start(&case, F32).measured_limit().is_err(), "f32 is too coarse");
 }
 
-/// Slices that are thin or sheared, fibres that are tight, and yarns that buckle are what the fibre lines do not help with.
+/// Thin or sheared slices, tight fibres and buckling yarns, where fibre lines do not help.
 #[test]
 fn the_estimate_holds_for_elements() {
     for (name, times, share) in [
@@ -63,7 +63,7 @@ fn the_estimate_holds_for_elements() {
         ("sliver_elements_on_fibre_lines", &[0.0], 0.5),
         ("distorted_hexahedra", &[0.0, 5e-5], 0.5),
         ("fibre_compression", &[0.0, 3e-4, 2e-3], 0.4),
-        // all of its nodes touch a plate and are as heavy as any step asks: there is no limit
+        // all of its nodes touch a plate and are as heavy as any step requires: there is no limit
         ("free_expansion", &[0.0], 0.0),
     ] {
         let mut loaded = read(Path::new(&format!("cases/hard/{name}.json")), &[]).unwrap();
@@ -76,7 +76,7 @@ fn the_estimate_holds_for_elements() {
         }
     }
     let yarn = block("yarn", [6, 3, 2], [[0.0, -0.5, -0.2], [2.0, 0.5, 0.2]], 1.8e-9, charmetant());
-    // pushed together, fibres on lines buckle faster than they swing
+    // pushed together, fibres on lines buckle faster than they oscillate
     for (lines, stretches) in [(json!({}), &[0.02][..]), (Value::Null, &[0.02, -0.05])] {
         for stretch in stretches {
             let conditions = json!([{ "within": [[0, -1, -1], [0, 1, 1]] }, { "within": [[2, -1, -1], [2, 1, 1]], "displacement_mm": [2.0 * stretch, 0, 0] }]);
@@ -94,7 +94,7 @@ fn the_estimate_holds_for_elements() {
     }
 }
 
-/// Lines that turn away from each other evenly, in every slice: the worst that fibres can do to the estimate.
+/// Lines that diverge evenly in every slice: the worst case of fibres for the estimate.
 #[test]
 fn the_estimate_holds_for_a_yarn_that_is_twisted_or_spread() {
     let yarn = block("yarn", [8, 4, 2], [[0.0, -0.5, -0.2], [2.0, 0.5, 0.2]], 1.8e-9, charmetant());
@@ -129,7 +129,7 @@ fn the_estimate_holds_for_a_cell_with_contact_and_stick() {
     }
 }
 
-/// Nodes whose elements would call for shorter steps are made heavier, and no heavier than that takes.
+/// Nodes whose elements would require shorter steps are made heavier, but only as much as necessary.
 #[test]
 fn a_least_limit_holds_for_elements() {
     let mut case = coarse_cell();
@@ -151,7 +151,7 @@ fn a_least_limit_holds_for_elements() {
     }
 }
 
-/// A step above the measured limit fails within 2,000 steps, one below it lasts.
+/// A time step above the measured limit fails within 2,000 steps; one below it is stable.
 #[test]
 fn steps_confirm_the_limit() {
     let cube = block("cube", [2, 2, 2], [[0.0; 3], [1.0; 3]], 1e-9, neo_hookean(100.0, 0.3));
@@ -169,7 +169,7 @@ fn steps_confirm_the_limit() {
     }
 }
 
-/// Light nodes at a face that is held do not set the step.
+/// Light nodes on a held face do not limit the time step.
 #[test]
 fn held_nodes_are_left_out() {
     let cube = block("cube", [4, 2, 2], [[0.0; 3], [1.0; 3]], 1e-9, neo_hookean(100.0, 0.3));

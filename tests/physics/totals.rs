@@ -1,5 +1,5 @@
-//! Totals that a backend adds up against sums of the full buffers on the host, in both precisions, in a periodic cell and in a
-//! free scene with contact, threads, prescribed motion and gravity.
+//! Totals reduced by a backend against sums of the full buffers on the host, in both precisions, in a periodic cell and in a free
+//! scene with contact, threads, prescribed motion and gravity.
 
 use crate::common::{advance, bare, below, block, charmetant, coarse_cell, loaded, neo_hookean, reduced, with};
 use serde_json::{Value, json};
@@ -22,7 +22,7 @@ fn cell() -> Value {
     with(coarse_cell(), &[("/steps", steps)])
 }
 
-/// Two blocks and a thread, so heavy that it stays, that overlap a little, pulled along.
+/// Two blocks and a thread too heavy to move, which overlap slightly and are pulled along.
 fn free() -> Value {
     let moved = json!({ "within": [[-0.1, -0.1, -0.1], [0.1, 1.1, 1.1]], "displacement_mm": [0.1, 0, 0] });
     let thread = json!({
@@ -69,7 +69,7 @@ fn named(simulation: &Simulation, name: &str) -> Option<Buffer> {
     simulation.model.plan.buffers.iter().position(|b| b.name == name).map(Buffer)
 }
 
-/// Runs a case to a time, then compares everything that is collected.
+/// Runs a case to a time, then compares all collected totals.
 fn check<R: Run>(case: &Value, until: f64, precision: Precision, rounding: f64) {
     let mut simulation = simulation(&loaded(case), BackendConfig { precision, ..BackendConfig::default() }).unwrap();
     advance(&mut simulation, until);

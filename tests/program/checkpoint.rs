@@ -1,4 +1,4 @@
-//! A run that is stopped goes on to the same bits; a checkpoint that is damaged or of another case is refused.
+//! A stopped run continues to the same bits; a checkpoint that is damaged or of another case is refused.
 
 use crate::common::program::{can_resume, contents, copy, failed, folder, hash, kill_after, program, ran, same};
 use crate::common::{advance, bare, block, loaded, neo_hookean, short_cell, with};
@@ -53,7 +53,7 @@ fn a_restored_scene_goes_on_to_the_same_bits() {
         let config = BackendConfig { precision, threads: 1, ..BackendConfig::default() };
         let mut whole = simulation(&case, config.clone(), capacity);
         let mut windows = 0;
-        // in the midst of a load step, and of the rows that a run would write
+        // in the middle of a load step, and between the rows of a run
         whole
             .advance(end, |_| {
                 windows += 1;
@@ -112,7 +112,7 @@ fn a_run_killed_at_any_moment_goes_on_to_the_same_files() {
     assert!(kills >= 6, "{kills} kills: the runs are too short to be stopped");
 }
 
-/// What a scheduler does: the same command again and again, whenever it was killed, and once more at the end.
+/// Behaviour of a scheduler: the same command after every kill, and once more at the end.
 #[cfg(unix)]
 #[test]
 fn one_command_starts_goes_on_and_says_that_it_is_finished() {
@@ -148,7 +148,7 @@ fn one_command_starts_goes_on_and_says_that_it_is_finished() {
     assert!(before == contents(&folder.join("killed-0")), "what is finished stays as it is");
 }
 
-/// Two runs that are started at once: one does everything, the other is told so and touches nothing.
+/// Two runs started at once: one does all the work, the other is told so and touches nothing.
 #[test]
 fn of_two_runs_at_once_one_is_refused() {
     let folder = folder(&short_cell());
@@ -253,7 +253,7 @@ fn a_study_starts_from_the_end_of_a_load_step() {
     for file in ["history.csv", "energies.csv", "yarns.csv", "stitches.csv", "shear.csv"] {
         assert_eq!(rows("first", file)[12..], rows("again", file)[..], "{file}");
     }
-    // later steps may change, what made the state may not
+    // later steps may change, but not those that made the state
     ran(folder, "other", &["--from", stretched, "--set", "steps.2.shear.angle_deg=-2", "--set", "title=other"]);
     assert!(rows("other", "history.csv").last().unwrap().contains(",shear,"));
     let fails = |more: &[&str]| failed(&program(folder, "bad", more).output().unwrap(), 4);

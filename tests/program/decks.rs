@@ -1,6 +1,6 @@
 //! Decks of a cell and a specimen as CalculiX reads them: it runs a static step on each as it is written.
 //!
-//! Where there is no `ccx` the test passes without it, unless `TRICOT_REQUIRE_CCX` is set.
+//! Without `ccx` the test passes without a check, unless `TRICOT_REQUIRE_CCX` is set.
 
 use crate::common::{coarse_cell, held_specimen, loaded};
 use serde_json::Value;
@@ -48,7 +48,7 @@ fn moved(case: &Value, sets: &[String], moved: &[(&str, f64)]) -> Option<Vec<f64
     Some(found.iter().map(|(_, u)| u[0]).collect())
 }
 
-/// A cell whose wefts are stretched: what is moved moves farthest.
+/// A cell whose wefts are stretched: the moved nodes move farthest.
 #[test]
 fn calculix_stretches_a_cell() {
     let sets = ["PERIODIC_X_ORIGINAL", "PERIODIC_X_COPY", "PERIODIC_Y_ORIGINAL", "PERIODIC_Y_COPY"];
@@ -59,7 +59,7 @@ fn calculix_stretches_a_cell() {
     assert!((largest / 1e-3 - 1.0).abs() < 1e-3);
 }
 
-/// A specimen whose every end is moved by the same way moves as a whole.
+/// A specimen whose ends all have the same displacement moves as a whole.
 #[test]
 fn calculix_moves_a_specimen() {
     let sets = ["HELD_CLAMP", "MOVED_CLAMP", "YARN_ENDS", "THREAD_ENDS"];

@@ -1,5 +1,5 @@
-//! Faults that are put in on purpose: each is named, what was written before stays, and the run goes on from its last checkpoint to
-//! the same files. Truncated and damaged checkpoints are in `checkpoint.rs`.
+//! Injected faults: each is named, earlier output stays, and the run continues from its last checkpoint to the same files.
+//! Truncated and damaged checkpoints are in `checkpoint.rs`.
 
 use crate::common::program::{can_resume, contents, copy, failed, folder, hash, kill_after, program, ran, same};
 use crate::common::{advance, bare, block, neo_hookean, short_cell, start, with};
@@ -25,7 +25,7 @@ fn cell() -> Value {
 /// Node that a stage spoils.
 const STRUCK: usize = 13;
 
-/// Puts something that is not a number in place of a force.
+/// Replaces a force by NaN.
 struct Spoil;
 
 impl Kernel for Spoil {
@@ -70,7 +70,7 @@ fn a_force_that_is_not_a_number_is_found_with_its_body() {
     }
 }
 
-/// What a fault does to the numbers of a buffer of a checkpoint.
+/// Change that a fault makes to the numbers of a buffer in a checkpoint.
 type Fault = fn(&mut Checkpoint);
 
 fn f32s(state: &mut Checkpoint, name: &str, change: impl Fn(usize, f32) -> f32) {
@@ -149,7 +149,7 @@ fn a_fault_in_memory_stops_the_run_and_it_goes_on_from_its_checkpoint() {
     }
 }
 
-/// A run that fails for want of space goes on to the same files when there is space again.
+/// A run that fails on a full disk continues to the same files when there is space again.
 #[cfg(unix)]
 fn goes_on(folder: &Path, name: &str, text: &str) {
     println!("{name}: {text}");

@@ -1,6 +1,6 @@
-//! Cases and checkpoints with bytes, tokens and lines changed at random, from the corpus of all cases that ship: whatever it is, it
-//! is read or refused in one line that names its file, and what is read can be built and run. Nothing panics.
-//! TRICOT_FUZZ sets how many there are of each kind, TRICOT_SEED which ones.
+//! Cases and checkpoints with bytes, tokens and lines changed at random, from the corpus of all cases that ship: each is read, or
+//! refused in one line that names its file, and every accepted one can be built and run. Nothing panics. TRICOT_FUZZ sets how
+//! many there are of each kind, TRICOT_SEED which ones.
 
 use crate::common::{Random, bare, block, neo_hookean, options, with};
 use serde_json::{Value, json};
@@ -20,7 +20,7 @@ fn number(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).map_or(otherwise, |text| text.parse().unwrap_or_else(|e| panic!("{name}={text}: {e}")))
 }
 
-/// What numbers, words and marks are replaced by.
+/// Replacements for numbers, words and punctuation.
 const TOKENS: [&str; 28] = [
     "0",
     "-0",
@@ -119,7 +119,7 @@ impl Mutator {
     }
 }
 
-/// Runs something that must not panic; otherwise what it was given stays in a file.
+/// Runs code that must not panic; if it does, its input is kept in a file.
 #[track_caller]
 fn calmly<T>(what: &str, given: &[u8], run: impl FnOnce() -> T) -> T {
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|_| {
@@ -154,7 +154,7 @@ fn corpus() -> Vec<(PathBuf, Vec<u8>)> {
     found
 }
 
-/// Whether an error says in one line what it is about.
+/// Whether an error names its subject in one line.
 #[track_caller]
 fn names_its_culprit(error: &Error, file: &Path) {
     let message = error.to_string();
@@ -312,7 +312,7 @@ fn checkpoints() {
                 assert!(error.to_string().contains("results"), "{error}");
             }
         }
-        // what the run wrote behind it makes way for the next one
+        // output written after it makes way for the next run
         for later in fs::read_dir(&states).unwrap().map(|e| e.unwrap().path()) {
             if later != path {
                 fs::remove_file(later).unwrap();

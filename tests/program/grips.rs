@@ -1,4 +1,4 @@
-//! Forces of grips and displacements of probes, in every row, beside those of a bar in tension.
+//! Forces of grips and displacements of probes in every row, against the closed form of a bar in tension.
 
 use crate::common::{bare, block, loaded, near, neo_hookean, options, with};
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use tricot::run::{check, run};
 const YOUNG: f64 = 100.0;
 const LENGTH: f64 = 8.0;
 
-/// A bar of 8 × 1 × 1 mm without lateral strain, whose ends are moved by some way along it and then held.
+/// A bar of 8 × 1 × 1 mm without lateral strain, whose ends are displaced along it and then held.
 fn bar(left: f64, right: f64) -> Value {
     let body = block("bar", [8, 1, 1], [[0.0; 3], [LENGTH, 1.0, 1.0]], 1e-9, neo_hookean(YOUNG, 0.0));
     let end = |name: &str, x: f64, way: f64| {

@@ -1,4 +1,4 @@
-//! The program and its files: cases, folders, checkpoints, faults, studies, and the rules of the house.
+//! The program and its files: cases, folders, checkpoints, faults, studies, and the house rules.
 
 #[path = "../common/mod.rs"]
 mod common;

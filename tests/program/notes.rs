@@ -1,10 +1,10 @@
-//! What `check` notes about cases that are valid all the same.
+//! Notes of `check` on cases that are valid nevertheless.
 
 use crate::common::{bare, block, coarse_cell, loaded, neo_hookean, with};
 use serde_json::{Value, json};
 use tricot::run::check;
 
-/// A fabric has its thermal strain for every case; one that does not tighten it says so.
+/// A fabric has its thermal strain for every case; `check` notes a case that does not tighten it.
 #[test]
 fn a_stitch_that_is_not_tightened_is_noted() {
     let hold = |steps: Value| check(&loaded(&with(coarse_cell(), &[("/steps", steps)])), false).unwrap();
@@ -13,7 +13,7 @@ fn a_stitch_that_is_not_tightened_is_noted() {
     assert!(!hold(json!([{ "pretension": { "time_s": 1e-5 } }])).contains("note "));
 }
 
-/// Full hexahedra of a nearly incompressible solid lock; the ones with one point do not.
+/// Fully integrated hexahedra of a nearly incompressible solid lock; hexahedra with one Gauss point do not.
 #[test]
 fn volumetric_locking_is_noted() {
     let bar = |poisson: f64, hexahedra: &str| {

@@ -1,4 +1,4 @@
-//! The report of a run: one well-formed page that fetches nothing and says what the tables say.
+//! The report of a run: one well-formed page that loads nothing and agrees with the tables.
 
 use crate::common::options;
 use base64::Engine;

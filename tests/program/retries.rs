@@ -1,4 +1,4 @@
-//! Going back: a run with too long a step is rescued by shorter ones, or says how often it tried; its bits stay reproducible.
+//! Rollback: shorter steps rescue a run whose step is too long, or it says how often it tried; its bits stay reproducible.
 
 use crate::common::program::{can_resume, failed, folder, kill_after, program, ran, same, summary};
 use crate::common::{bare, block, neo_hookean, with};
@@ -76,7 +76,7 @@ fn too_long_a_step_is_rescued_in_a_reproducible_way() {
     ran(folder, "again", &[]);
     same(folder, "whole", "again");
 
-    // killed again and again, before and after it went back
+    // killed repeatedly, before and after the rollback
     let mut resume: &[&str] = &[];
     let mut kills = 0;
     for wait in (0..).map(|attempt| 20 + 15 * attempt) {

@@ -1,4 +1,4 @@
-//! A coarse cell run through the library and through the program: what it leaves on disk, and how it ends.
+//! A coarse cell run through the library and through the program: its files on disk, and its end.
 
 use crate::common::options;
 use crate::common::program::contents;
@@ -109,7 +109,7 @@ fn a_run_leaves_what_the_readme_says() {
     let force = column(&dir.join("history.csv"), "f_nor_n_per_mm");
     let stress = ["p_xx", "p_xy", "p_yx", "p_yy"].map(|p| column(&dir.join("stress.csv"), &format!("{p}_n_per_mm")));
     let largest = force.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
-    // where the shear gathers and loses speed, time and angle are not in step
+    // where the shear rate rises and falls, time and angle are not proportional
     for row in 22..29 {
         let (sin, cos) = (0.25 * (angles[row] + angles[row - 1])).sin_cos();
         let [xx, xy, yx, yy] = [0, 1, 2, 3].map(|k| stress[k][row]);

@@ -1,4 +1,4 @@
-//! The schema says of every field what it means and how large it may be, and the shipped cases keep to it.
+//! The schema gives the meaning and range of every field, and the shipped cases conform to it.
 
 use serde_json::Value;
 use std::fs;
@@ -21,7 +21,7 @@ fn nodes<'a>(node: &'a Value, path: &str, field: bool, found: &mut Vec<(String, 
         for child in node.get(keyword).and_then(Value::as_array).into_iter().flatten() {
             let first = found.len();
             nodes(child, path, false, found);
-            // what the one field of a variant means stands with the variant
+            // the variant carries the description of its one field
             if child.get("description").is_some() && child.get("required").is_some() {
                 found[first..].iter_mut().skip(1).take(1).for_each(|own| own.2 = false);
             }
@@ -44,7 +44,7 @@ fn every_field_is_described_and_every_number_has_a_range() {
         nodes(&schema, "", false, &mut found);
         assert!(found.len() > 40);
         for (path, node, field) in found {
-            // The one field of a variant: what it means stands with the variant.
+            // The variant carries the description of its one field.
             let tag = node.get("type").is_some_and(|t| t == "object") || node.get("$ref").is_some();
             assert!(!field || tag || node.get("description").is_some(), "{path} has no description");
             if is_number(node) {
@@ -58,7 +58,7 @@ fn every_field_is_described_and_every_number_has_a_range() {
     }
 }
 
-/// The checks read these keywords; another one would be in the schema and not be checked.
+/// The checks read these keywords; any other keyword in the schema would not be checked.
 #[test]
 fn the_schema_uses_only_keywords_that_are_checked() {
     let known = [
@@ -119,7 +119,7 @@ fn shipped_cases_and_fabrics_are_valid() {
     }
 }
 
-/// The defaults that the schema shows are those that a case gets.
+/// The defaults in the schema are those of a case.
 #[test]
 fn defaults_are_in_the_schema_and_in_range() {
     let loaded = read(Path::new("cases/unit_cell_shear.json"), &[]).unwrap();
@@ -132,7 +132,7 @@ fn defaults_are_in_the_schema_and_in_range() {
     }
 }
 
-/// Paths and values of what is no object.
+/// Paths and values of all non-objects.
 fn leaves<'a>(value: &'a Value, path: String, found: &mut Vec<(String, &'a Value)>) {
     match value.as_object() {
         Some(fields) => {
@@ -145,7 +145,7 @@ fn leaves<'a>(value: &'a Value, path: String, found: &mut Vec<(String, &'a Value
     }
 }
 
-/// A word for the accuracy stands for fields that the case leaves out, and they are named among its defaults.
+/// An accuracy word sets fields that the case leaves out, and they are listed among its defaults.
 #[test]
 fn an_accuracy_fills_what_a_case_leaves_out() {
     let cell = |sets: &[&str]| {

@@ -1,4 +1,4 @@
-//! The house rules that a reader relies on, checked on the sources: which module may know which, sizes, docs, cases, README.
+//! The house rules, checked on the sources: dependencies between modules, sizes, docs, cases, README.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -45,7 +45,7 @@ fn module(path: &Path) -> String {
     first.trim_end_matches(".rs").into()
 }
 
-/// The order that the docs of the crate state, earliest first.
+/// The order of modules in the docs of the crate, earliest first.
 fn order() -> Vec<String> {
     let docs = text(Path::new("src/lib.rs"));
     let line = docs.lines().find(|l| l.starts_with("//! error kernel ")).expect("lib.rs states the order");
@@ -125,7 +125,7 @@ fn help(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Commands, options, cases and links of the README exist. Pictures are left out: they are made by a run.
+/// Commands, options, cases and links of the README exist. Pictures are left out, since a run makes them.
 #[test]
 fn the_readme_speaks_of_what_is_there() {
     let readme = text(Path::new("README.md"));

@@ -1,4 +1,4 @@
-//! Studies and comparisons of runs: they say what the tables of the runs say, and go on where they were stopped.
+//! Studies and comparisons of runs: they agree with the tables of the runs, and continue where they were stopped.
 
 use crate::common::{coarse_cell, with};
 use serde_json::{Value, json};
@@ -65,7 +65,7 @@ fn comparisons_say_what_the_tables_say() {
     let told = [json["measures"][row]["relative_l2"].as_f64().unwrap(), table.numbers("relative_l2")[row]];
     assert!((told[0] - told[1]).abs() < 1e-12, "{told:?}");
 
-    // the other way of shear has positive angles and forces, and rows up to its end
+    // shear to the other side has positive angles and forces, and rows up to its end
     let [a, b] = [&a, &b].map(|dir| Results::read(dir).unwrap());
     let curves = [a.curve(&MEASURES[0]), b.curve(&MEASURES[0])];
     let ends = curves.each_ref().map(|curve| curve[curve.len() - 1]);
@@ -73,7 +73,7 @@ fn comparisons_say_what_the_tables_say() {
     assert!(ends.iter().all(|end| end[1] > 0.0), "{ends:?}");
     assert!((json["range"][1].as_f64().unwrap() - 2.0).abs() < 0.01, "{}", json["range"]);
 
-    // by another route: forces where both have the angle, without windows; windows take away jitter, so this one is larger
+    // by another route: forces at common angles, without windows; windows remove jitter, so this difference is larger
     let history = Columns::read(&b.folder.join("history.csv")).unwrap();
     let rows: Vec<[f64; 2]> = history
         .numbers("shear_angle_deg")
@@ -137,10 +137,10 @@ fn a_study_says_what_its_runs_say_and_runs_none_of_them_twice() {
     assert_eq!(table.texts("ended")[impossible], "impossible", "19 beams do not go around a lap");
     assert!((times[..3].iter().sum::<f64>() - 3.0).abs() < 1e-9, "{times:?}");
     assert_eq!(times.iter().filter(|time| time.is_nan()).count(), 1, "{times:?}");
-    // several times the work, whatever the machine does meanwhile
+    // several times the work, whatever the load of the machine
     assert!(times[row("reference")] > 2.0, "{times:?}");
 
-    // errors are differences from the reference, and none is claimed that places of nodes may make
+    // errors are differences from the reference, and none is claimed below the effect of node positions
     let json: Value = serde_json::from_slice(&fs::read(dir.join("accuracy.json")).unwrap()).unwrap();
     let of = |name: &str| Results::read(&dir.join("points").join(name)).unwrap();
     let by = |what: &str| json[what]["F_nor"].as_f64().unwrap();
@@ -158,7 +158,7 @@ fn a_study_says_what_its_runs_say_and_runs_none_of_them_twice() {
         assert_eq!((claimed, cell.starts_with('<')), (found.max(places), found < places), "{name}");
     }
 
-    // the flags of a point are those that make it, from the tightened state where only the loading differs
+    // the flags of a point reproduce it, from the tightened state where only the loading differs
     let flags = table.texts("flags");
     assert_eq!(flags[row("beams × 2")], "--set resolution.beams_per_lap=64");
     let loading = flags[row("loading × 0.5")];

@@ -1,5 +1,5 @@
-//! `tricot study effects` on the coarse cell: rows for what is asked for, and changes that are those of an effect
-//! rather than of chance. `tricot check --explain`: every effect with what called for it.
+//! `tricot study effects` on the coarse cell: rows for the requested effects, and changes due to an effect rather than to chance.
+//! `tricot check --explain`: every effect with the reason for it.
 
 use crate::common::{coarse_cell, held_specimen, loaded, with};
 use serde_json::json;
@@ -54,7 +54,7 @@ fn an_effect_that_the_scene_does_not_have_is_refused_by_name() {
     assert!(message.contains("--only gravity") && message.contains("friction, "), "{message}");
 }
 
-/// Where the scene itself comes to a guard there is nothing to compare with: the guard is what is wrong.
+/// If a guard stops the scene itself, there is nothing to compare with: the guard is the error.
 #[test]
 fn a_scene_that_a_guard_stops_is_the_error() {
     let folder = tempfile::tempdir().unwrap();
@@ -103,7 +103,7 @@ fn explain_names_every_effect_with_what_called_for_it_and_its_share() {
     assert!(!listed.contains("\n  friction ") && !listed.contains("\n  periodicity "));
 }
 
-/// Every effect that can be turned off is gone from the scene without it.
+/// Every effect that can be turned off is absent from the scene without it.
 #[test]
 fn a_scene_without_an_effect_does_not_have_it() {
     for case in [coarse_cell(), held_specimen()] {

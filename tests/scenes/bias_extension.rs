@@ -1,5 +1,5 @@
-//! A small specimen that is pulled: forces of its clamps against momentum and work, zones beside the theory, what the tables
-//! and the report say, and a curve that survives a kill.
+//! A small specimen that is pulled: forces of its clamps against momentum and work, zones beside the theory, the contents of
+//! tables and report, and a curve that survives a kill.
 
 use crate::common::{below, near, options};
 use serde_json::Value;
@@ -22,7 +22,7 @@ const LENGTH: f64 = 36.0;
 const WIDTH: f64 = 12.0;
 const ROWS: usize = 12;
 
-/// A smaller specimen, coarse, pulled by a millimetre in little time.
+/// A smaller and coarser specimen, pulled quickly by a millimetre.
 const SETS: [&str; 14] = [
     "domain.specimen.length_mm=36",
     "domain.specimen.width_mm=12",
@@ -62,12 +62,12 @@ fn summary(dir: &Path) -> Value {
     serde_json::from_slice(&fs::read(dir.join("summary.json")).unwrap()).unwrap()
 }
 
-/// Step by step, what internal forces do to one clamp they do to the other but for what sets yarns between them in motion,
-/// and the work of prescribed motion is that of the clamp that moves.
+/// At every step, internal forces on both clamps balance except for the force that accelerates the yarns between them, and the
+/// work of prescribed motion is that of the moving clamp.
 #[test]
 fn clamps_feel_each_other_and_the_one_that_moves_does_the_work() {
     let mut loaded = loaded();
-    // contact would take up momentum with the mass that it adds for a while
+    // contact would absorb momentum with its temporary added mass
     loaded.case.effects.contact_mass = None;
     let Domain::Specimen(specimen) = &loaded.case.domain else { panic!("{:?}", loaded.case.domain) };
     let mut s = run::simulation(&loaded, BackendConfig { threads: 2, ..BackendConfig::default() }).unwrap();
@@ -174,7 +174,7 @@ fn tables_of_a_specimen_hold_force_zones_and_theory() {
     assert_eq!(crossings.numbers("displacement_mm").last(), d.last());
     assert!(dir.join("crossings.pvd").is_file());
 
-    // what a person reads
+    // the text for a reader
     assert!(text.lines().count() <= 12, "{text}");
     assert!(text.contains("force      ") && text.contains("sheared by") && text.contains("without slip (Eq. 18)"));
     assert!(!text.contains("tomography") && !text.contains("before shear"), "{text}");

@@ -1,5 +1,5 @@
 //! Every scene of `cases/hard`, shortened where it is long, shows what its `expect` says: on the CPU in f32 and f64, and small
-//! ones on the GPU backend. Without an adapter that test says so and goes on, unless TRICOT_REQUIRE_ADAPTER is set.
+//! ones on the GPU backend. Without an adapter that test says so and passes, unless TRICOT_REQUIRE_ADAPTER is set.
 
 use std::path::Path;
 use std::time::Instant;
@@ -12,14 +12,14 @@ use tricot::study::stability::scenes;
 
 const FOLDER: &str = "cases/hard";
 
-/// What is shorter here than in the study.
+/// Overrides that shorten scenes here relative to the study.
 const SHORTER: [(&str, &str); 1] = [("long_rest_under_tension", "steps.3.hold.time_s=5e-3")];
 
 /// Scenes of few steps, for a device in software.
 const SMALL: [&str; 5] =
     ["nodes_on_nodes", "nodes_on_edges", "touching_at_the_start", "penetrating_at_the_start", "askew_mirrored"];
 
-/// Runs the scenes that are wanted and fails with every expectation that does not hold.
+/// Runs the wanted scenes and fails with a list of all unmet expectations.
 fn check(config: BackendConfig, wanted: impl Fn(&str) -> bool) {
     let (mut all, mut failed) = (Scenes::new(config), Vec::new());
     for path in scenes(Path::new(FOLDER)).unwrap() {

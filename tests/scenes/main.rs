@@ -1,4 +1,4 @@
-//! Whole scenes, which take their time: the shipped cell, specimens, hard cases, random fabrics.
+//! Whole scenes, which run for minutes: the shipped cell, specimens, hard cases, random fabrics.
 
 #[path = "../common/mod.rs"]
 mod common;

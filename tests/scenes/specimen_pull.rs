@@ -1,5 +1,5 @@
-//! Physics of a bias-extension run on a specimen small enough for every day: what keeps the stitch tight at the cuts, and what
-//! pulling costs.
+//! Physics of a bias-extension run on a specimen small enough for daily tests: tightness of the stitch at the cuts, and the
+//! pulling force.
 
 use serde_json::json;
 use std::path::Path;
@@ -12,7 +12,7 @@ use tricot::simulate::{BackendConfig, Simulation};
 /// Displacement of the clamp, mm: 26° of shear without slip (Eq. 18).
 const PULL: f64 = 1.2;
 
-/// The small specimen of the cases, smaller still.
+/// The small specimen of `cases`, reduced further.
 fn loaded(sets: &[&str]) -> Loaded {
     let steps = json!([
         { "pretension": { "time_s": 3e-3 } }, { "hold": { "time_s": 0.5e-3 } }, { "move": { "time_s": 3.2e-3 } }

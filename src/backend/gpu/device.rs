@@ -1,4 +1,4 @@
-//! Adapters, the device that a run works on, its limits and its faults.
+//! Adapters, and the device of a run with its limits and faults.
 
 use super::Gpu;
 use super::pipeline::Pipeline;
@@ -31,7 +31,7 @@ pub struct Device {
     faults: Arc<Mutex<Faults>>,
 }
 
-/// What went wrong first, and whether the device was lost, which tells more than what that made go wrong.
+/// The first error, and the loss of the device, which explains the errors that follow from it.
 #[derive(Default)]
 struct Faults {
     first: Option<String>,
@@ -85,7 +85,7 @@ fn list(adapter: &wgpu::Adapter) -> Adapter {
     }
 }
 
-/// All adapters, the one that a run would take first.
+/// All adapters, in the order in which a run prefers them.
 pub fn devices() -> Vec<Adapter> {
     adapters().iter().map(list).collect()
 }
@@ -116,7 +116,7 @@ impl Device {
     /// Opens the first adapter whose name contains `name` (any if empty; hardware before software).
     ///
     /// # Errors
-    /// No such adapter, or one that cannot do what the stages need.
+    /// No such adapter, or one that does not meet the needs of the stages.
     pub fn open(name: &str) -> Result<Arc<Self>> {
         let all = adapters();
         let known = || all.iter().map(|a| format!("`{}`", a.get_info().name)).collect::<Vec<_>>().join(", ");
@@ -181,15 +181,15 @@ impl Device {
         Ok(device)
     }
 
-    /// What the adapter is.
+    /// Properties of the adapter.
     pub fn listed(&self) -> &Adapter {
         &self.listed
     }
 
-    /// What made the device fail, if it has.
+    /// The fault of the device, if it has failed.
     pub fn fault(&self) -> Option<String> {
         if locked(&self.faults).first.is_some() {
-            // word of a loss comes with the next poll; that may fail too
+            // the next poll reports a loss; it may fail too
             _ = self.device.poll(wgpu::PollType::Poll);
         }
         let faults = locked(&self.faults);
@@ -201,7 +201,7 @@ impl Device {
         locked(&self.faults).first.get_or_insert(line(what));
     }
 
-    /// Drops the device as a driver would that crashed; to test that a run ends well.
+    /// Destroys the device as a crashed driver would, to test how a run ends.
     pub fn lose(&self) {
         self.device.destroy();
     }

@@ -1,10 +1,10 @@
 //! The GPU backend: the WGSL twins of the stages, through wgpu. Only this folder knows wgpu.
 //!
-//! Steps are recorded into one compute pass, a dispatch for each stage and an offset into a buffer of rows for each step, and
-//! submitted when something is read, so that a burst of steps, the look at how far nodes have moved and the copy of the
-//! status are one submission. Dispatches that share no buffer that either writes may overlap.
+//! Steps are recorded into one compute pass, with a dispatch for each stage and an offset into a buffer of rows for each step.
+//! They are submitted when something is read: a burst of steps, the check of the distance travelled and the copy of the status
+//! are one submission. Two dispatches may overlap if neither writes a buffer of the other.
 //!
-//! A device that fails stays failed: what is read from it afterwards is zeros, and [`Backend::fault`] says why.
+//! A device that fails stays failed: later reads return zeros, and [`Backend::fault`] says why.
 
 mod device;
 mod pipeline;
@@ -37,11 +37,11 @@ const TIMED_EVERY: u64 = 7;
 /// Stages of a timed call at most.
 const TIMED_STAGES: u32 = 64;
 
-/// Buffers on a device, and what waits to be submitted.
+/// Buffers on a device, and work that waits to be submitted.
 pub struct Gpu {
     device: Arc<Device>,
     buffers: Vec<wgpu::Buffer>,
-    /// Kind and length of each buffer; those without numbers have room for one.
+    /// Kind and length of each buffer; empty buffers have room for one number.
     shapes: Vec<(Kind, usize)>,
     rows: wgpu::Buffer,
     row_group: wgpu::BindGroup,
@@ -51,7 +51,7 @@ pub struct Gpu {
     work: RefCell<Work>,
 }
 
-/// Commands that are recorded and not submitted, and times that are measured.
+/// Commands recorded but not submitted, and measured times.
 struct Work {
     encoder: wgpu::CommandEncoder,
     /// Rows written since the last submission.
@@ -183,7 +183,7 @@ impl Gpu {
         bytemuck::pod_collect_to_vec(&self.bytes(buffer))
     }
 
-    /// Records stages for one row that is in place; each in a pass of its own if they are timed.
+    /// Records stages for rows in place; each stage in its own pass if timed.
     fn record(&self, work: &mut Work, stages: &[Stage], rows: &[u32], timed: bool) {
         let ready: Vec<(&Stage, &Bound)> =
             stages.iter().filter(|s| s.count > 0).filter_map(|s| Some((s, self.bound.get(&key(s))?))).collect();
@@ -237,7 +237,7 @@ impl Gpu {
     }
 }
 
-/// What makes a stage different from the other stages of its plan.
+/// Hash that identifies a stage among the stages of its plan.
 fn key(stage: &Stage) -> u64 {
     let mut hasher = DefaultHasher::new();
     (stage.kernel.shader, stage.first, stage.count, &stage.reads, &stage.params).hash(&mut hasher);
@@ -339,7 +339,7 @@ impl Backend for Gpu {
     }
 
     fn set_bytes(&mut self, buffer: Buffer, bytes: &[u8]) {
-        // a write comes before everything that is recorded and not submitted
+        // a write would overtake everything recorded but not submitted
         self.flush();
         self.device.queue.write_buffer(&self.buffers[buffer.0], 0, bytes);
     }
@@ -383,7 +383,7 @@ impl Backend for Gpu {
     }
 }
 
-/// Whether the device does integers and sums with remainders as the CPU does, bit by bit.
+/// Checks that the device computes integers and sums with remainders as the CPU does, bit by bit.
 fn self_test(device: &Arc<Device>) -> Result<()> {
     const ITEMS: usize = 512;
     let (quanta, increments): (Vec<i32>, Vec<f64>) = (0..ITEMS).map(exact::start).unzip();

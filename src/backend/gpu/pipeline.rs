@@ -1,4 +1,4 @@
-//! The compiled shader of a stage, and its buffers bound.
+//! The compiled shader of a stage, and its bound buffers.
 
 use super::device::Device;
 use crate::error::{Error, Result};

@@ -1,11 +1,11 @@
-//! What a device can do at best: bytes moved and operations done in a second, measured with a long copy and with long chains
-//! of multiply–adds. The benchmark sets the time of a step beside them.
+//! Peak rates of a device: bytes moved and operations done per second, measured with a long copy and with long chains of
+//! multiply–adds. The benchmark compares the time of a step with them.
 
 use super::device::Device;
 use std::time::Instant;
 use wgpu::util::DeviceExt as _;
 
-/// The best rates of a device.
+/// The peak rates of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rates {
     /// Bytes read and written, 1/s.
@@ -59,11 +59,11 @@ fn multiply_add(
 const OPERATIONS: f64 = 256.0 * 2.0 * 4.0 * 2.0;
 /// Bytes of each of the two buffers; less on an adapter that cannot bind as much.
 const BYTES: u64 = 256 << 20;
-/// Rounds of which the best counts.
+/// Number of rounds, of which the best counts.
 const ROUNDS: usize = 5;
 
 impl Device {
-    /// Measures the best rates of the device.
+    /// Measures the peak rates of the device.
     pub fn rates(&self) -> Rates {
         let gpu = &self.device;
         let bytes = BYTES.min(self.listed().binding_bytes) / 16 * 16;

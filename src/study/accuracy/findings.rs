@@ -1,4 +1,4 @@
-//! What the runs of a study say: errors, times, and which points nothing else beats.
+//! Findings of a study: errors, times, and the points that no other one beats.
 
 use super::points::{Point, Ran, Role};
 use crate::error::Result;
@@ -6,12 +6,12 @@ use crate::study::difference::{Curve, Difference, by_chance, difference, smoothe
 use crate::study::results::{MEASURES, Measure, Results};
 use std::path::PathBuf;
 
-/// A point that was run.
+/// A completed point.
 pub struct Row {
     pub point: Point,
     pub ran: Ran,
     pub results: Option<Results>,
-    /// Time over the mean of the case itself and its like; NaN if it did not finish.
+    /// Time over the mean time of the case and its chance variants; NaN if it did not finish.
     pub time: f64,
     /// Differences from the reference and from the case itself, by measure; `None` if it did not finish.
     pub errors: Vec<Option<Difference>>,
@@ -20,18 +20,18 @@ pub struct Row {
     pub front: bool,
 }
 
-/// A study, as far as it has come.
+/// A study, as far as it is complete.
 pub struct Findings {
     pub measures: Vec<&'static Measure>,
-    /// How far two runs of the case are apart by chance, by measure: relative L2.
+    /// Relative L2 difference of two runs of the case by chance, by measure.
     pub chance: Vec<f64>,
-    /// How far runs on meshes of the same fineness are apart, whose nodes lie at other places: no error is known better.
+    /// Difference of runs on meshes of equal fineness with nodes at other places: no error is known better.
     pub places: Vec<f64>,
     pub rows: Vec<Row>,
 }
 
 impl Findings {
-    /// Of points with their runs and folders, the case itself first.
+    /// From points with their runs and folders, the case itself first.
     ///
     /// # Errors
     /// Results that cannot be read.
@@ -83,7 +83,8 @@ impl Findings {
         Ok(findings)
     }
 
-    /// Error of a row in a measure, and whether it is above what places of nodes make: one below is only known to be no larger.
+    /// Error of a row in a measure, and whether it exceeds the effect of node positions; a smaller error is only known to be no
+    /// larger than that effect.
     pub fn claim(&self, row: &Row, measure: usize) -> Option<(f64, bool)> {
         let error = row.errors.get(measure).copied().flatten()?.l2;
         Some(bounded(error, self.places[measure]))
@@ -113,7 +114,7 @@ impl Findings {
         candidates.into_iter().map(|(number, ..)| number).collect()
     }
 
-    /// Times of the case itself and its like, over their mean: smallest and largest.
+    /// Smallest and largest time of the case and its chance variants, over their mean.
     pub fn repeated(&self) -> [f64; 2] {
         let alike = self.rows.iter().filter(|row| row.is_alike());
         alike.map(|row| row.time).fold([f64::NAN; 2], |[low, high], time| [low.min(time), high.max(time)])
@@ -131,18 +132,18 @@ impl Row {
         matches!(self.point.role, Role::Default | Role::Turned)
     }
 
-    /// Whether it is the case itself, but for chance.
+    /// Whether it is the case itself or a chance variant.
     fn is_alike(&self) -> bool {
         matches!(self.point.role, Role::Default | Role::Chance)
     }
 
-    /// A number of its summary; NaN if there is none.
+    /// A number in its summary; NaN if absent.
     pub fn number(&self, name: &str) -> f64 {
         self.results.as_ref().map_or(f64::NAN, |results| results.number(name))
     }
 }
 
-/// An error that is at least what chance makes, and whether it was above that.
+/// The larger of an error and its floor, and whether the error exceeds the floor.
 fn bounded(error: f64, chance: f64) -> (f64, bool) {
     if error < chance { (chance, false) } else { (error, true) }
 }

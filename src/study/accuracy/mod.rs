@@ -1,8 +1,8 @@
-//! `tricot study accuracy`: what accuracy costs in time, for the user's own case.
+//! `tricot study accuracy`: the cost of accuracy in time, for the user's own case.
 //!
-//! [`variations`] lists the knobs as data, [`points`] makes a run of each, `stopwatch` times it on a machine that may have other work
-//! to do, [`findings`] compares the runs with the reference, and `write` puts that on disk. A run that is there already is not
-//! run again, so a study that was stopped goes on.
+//! [`variations`] lists the knobs as data, [`points`] runs each of them, `stopwatch` times it on a machine that may have other
+//! work, [`findings`] compares the runs with the reference, and `write` puts the result on disk. Existing runs are not repeated,
+//! so a stopped study continues.
 
 pub mod findings;
 pub mod points;
@@ -19,35 +19,35 @@ use points::{Ran, Role, Runner};
 use std::path::{Path, PathBuf};
 use write::Report;
 
-/// What the command line says about a study, beyond the case.
+/// Options of a study, besides the case.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Folder of the study.
     pub output: PathBuf,
-    /// Words of which a point must have one in its knob or label; none for all points.
+    /// Words that select points by knob or label; none for all points.
     pub points: Vec<String>,
-    /// What the points run on, unless that is their knob.
+    /// Machine for the points, unless it is their knob.
     pub machine: Machine,
     /// Number of threads; `None` for all cores.
     pub threads: Option<usize>,
-    /// No progress.
+    /// Whether to print no progress.
     pub quiet: bool,
 }
 
-/// How a study went.
+/// Outcome of a study.
 #[derive(Debug, Clone)]
 pub struct Study {
-    /// The user stopped it; what was run by then is found again.
+    /// Whether the user stopped it; completed runs are found again.
     pub interrupted: bool,
-    /// The table for a person.
+    /// The table as text.
     pub text: String,
 }
 
-/// Runs the points of a study that are not there yet, and writes it anew after each of them.
+/// Runs the missing points of a study, and rewrites the study after each of them.
 ///
 /// # Errors
-/// A case that cannot be run, points that do not exist, a case or a reference that does not come to its end, or files that
-/// cannot be written.
+/// A case that cannot be run, points that do not exist, a case or reference that does not finish, or files that cannot be
+/// written.
 pub fn accuracy(case: &Path, sets: &[String], options: &Options) -> Result<Study> {
     let mut runner = Runner::new(case, sets, options)?;
     let points = runner.points()?;
@@ -81,7 +81,7 @@ pub fn accuracy(case: &Path, sets: &[String], options: &Options) -> Result<Study
     Ok(study)
 }
 
-/// Without the case itself and the reference there is nothing to say.
+/// Fails without the case itself or the reference, which every finding needs.
 fn needed(role: Role, ran: &Ran, case: &Path) -> Result<()> {
     if ran.finished() || !matches!(role, Role::Default | Role::Reference) {
         return Ok(());

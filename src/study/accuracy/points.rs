@@ -1,4 +1,4 @@
-//! The points of a study: which case each of them is, where its results are, and how it is run or found again.
+//! The points of a study: the case of each, the place of its results, and how it is run or found again.
 
 use super::Options;
 use super::stopwatch::{Clocks, Stopwatch};
@@ -17,25 +17,25 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// What a run leaves beside its results.
+/// File that a run leaves beside its results.
 const RAN: &str = "point.json";
-/// Outputs that no point needs.
+/// Overrides that turn off outputs no point needs.
 const OUTPUTS: [&str; 4] =
     ["output.pictures=false", "output.frames_at_deg=[]", "output.frames_per_step=0", "output.checkpoint_wall_s=null"];
 /// Checkpoints at the ends of load steps only, for the case itself.
 const STATES: &str = "output.checkpoint_wall_s=1e6";
 
-/// What a point is for.
+/// Purpose of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// The case as it is.
     Default,
-    /// The case again, with a chance of its own.
+    /// The case again, with its own random perturbation.
     Chance,
     /// The case with nodes at other places.
     Places,
     Reference,
-    /// Shows that the reference has converged.
+    /// A check that the reference has converged.
     Check,
     /// One knob turned.
     Turned,
@@ -51,7 +51,7 @@ pub struct Point {
 }
 
 impl Point {
-    /// Whether threads or device are its knob.
+    /// Whether its knob is the number of threads or the device.
     fn has_own_machine(&self) -> bool {
         self.flags.threads.is_some() || self.flags.cpu
     }
@@ -68,23 +68,23 @@ impl Point {
     }
 }
 
-/// How the run of a point went.
+/// Outcome of the run of a point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ran {
     /// `finished`, the cause of the guard that stopped it, or `impossible`.
     pub ended: String,
-    /// What the guard said, or why the case is none.
+    /// Message of the guard, or why the case is impossible.
     pub message: String,
-    /// Options of `tricot run` behind the name of the case, besides those of the study.
+    /// Options of `tricot run` after the name of the case, besides those of the study.
     pub flags: String,
-    /// What the study runs on.
+    /// Machine of the study.
     pub base: String,
-    /// Time without what the stopwatch took, s.
+    /// Time without that of the stopwatch, s.
     pub seconds: Clocks,
-    /// That in steps of the stopwatch's scene, all of it and until the end of tightening.
+    /// The same in steps of the stopwatch's scene, in total and until the end of tightening.
     pub work: Clocks,
     pub tightening: Clocks,
-    /// Whether it runs on the threads of the default and on no device, so that the time of processors tells its cost.
+    /// Whether it runs on the default number of threads and no device, so that processor time measures its cost.
     pub by_processors: bool,
     /// Whether it started from the tightened state of the case.
     pub from_state: bool,
@@ -120,10 +120,10 @@ impl<'a> Runner<'a> {
         Ok(Self { case, sets, options, default: value(&loaded)?, phases, on_gpu, stopwatch })
     }
 
-    /// The points, in the order in which they are run: those that the others are compared with come first.
+    /// The points in running order: those for comparison come first.
     ///
     /// # Errors
-    /// A choice of points that is none.
+    /// A selection that matches no point.
     pub(super) fn points(&self) -> Result<Vec<Point>> {
         let own = Point { role: Role::Default, knob: "default", label: "default", flags: Flags::default() };
         let point = |role: Role, variation: &'static Variation| {
@@ -160,7 +160,7 @@ impl<'a> Runner<'a> {
     /// Runs a point, or finds it run already; `None` if the user stopped it.
     ///
     /// # Errors
-    /// What keeps the whole study from going on, such as a full disk. A guard that stops the run is a result.
+    /// A failure that stops the whole study, such as a full disk. A guard that stops the run is a result.
     pub(super) fn perform(&mut self, point: &Point) -> Result<Option<Ran>> {
         let outputs = OUTPUTS.map(String::from);
         let mut sets = [self.sets, &point.flags.sets, &outputs].concat();
@@ -223,7 +223,7 @@ impl<'a> Runner<'a> {
         Ok(Some(ran))
     }
 
-    /// The state of the tightened case, for a point that only differs in what comes later.
+    /// The state of the tightened case, for a point that differs only after it.
     fn state(&self, point: &Point, loaded: &Loaded) -> Result<Option<PathBuf>> {
         if point.role != Role::Turned || point.has_own_machine() || self.phases == 0 {
             return Ok(None);
@@ -263,7 +263,7 @@ fn found(folder: &Path, loaded: &Loaded) -> Result<Option<Ran>> {
     Ok(ran.filter(|_| same))
 }
 
-/// Whether there is no such case: a mesh too coarse to be built, say.
+/// Whether no such case exists, for example since a mesh is too coarse to be built.
 fn is_impossible(error: &Error) -> bool {
     matches!(error, Error::Case { .. } | Error::Geometry { .. })
 }
@@ -291,7 +291,7 @@ impl Ran {
         self.ended == "finished"
     }
 
-    /// Mean time of some runs, the first of which lends the rest; `None` for none.
+    /// The first of some runs with the mean of their times; `None` for none.
     pub(super) fn mean(runs: &[&Self]) -> Option<Self> {
         let mean = |of: &dyn Fn(&Self) -> Clocks| Clocks::mean(&runs.iter().map(|run| of(run)).collect::<Vec<_>>());
         let work = mean(&|run| run.work);
@@ -299,14 +299,14 @@ impl Ran {
         runs.first().map(|first| Self { work, tightening, ..(*first).clone() })
     }
 
-    /// Its time over that of another run, by the clock that tells; NaN if it did not finish.
+    /// Its time over that of another run, by the clock that measures cost; NaN if it did not finish.
     pub(super) fn over(&self, other: &Self) -> f64 {
         let clock = |clocks: Clocks| if self.by_processors { clocks.cpu } else { clocks.wall };
         let before = if self.from_state { clock(other.tightening) } else { 0.0 };
         if self.finished() { (clock(self.work) + before) / clock(other.work) } else { f64::NAN }
     }
 
-    /// For programs.
+    /// JSON for programs.
     pub(super) fn json(&self) -> Value {
         json!({ "ended": self.ended, "message": self.message, "flags": self.flags, "seconds": self.seconds })
     }

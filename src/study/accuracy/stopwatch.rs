@@ -1,6 +1,5 @@
-//! Time on a machine that has other work to do: beside a run, at short intervals, the same small scene is timed, and the run is
-//! told in steps of that scene. What slows both down drops out. Time that the processors give to others is not counted at all by the
-//! second clock.
+//! Timing on a machine with other work: at short intervals during a run, the same small scene is timed, and the run is measured
+//! in steps of that scene. Slowdowns of both cancel. A second clock does not count processor time of other processes at all.
 
 use crate::error::{Error, Result};
 use crate::rigs::read::read;
@@ -11,15 +10,15 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Steps of the scene that are timed, and steps before them that bring it back into the caches.
+/// Timed steps of the scene, and steps before them that warm the caches.
 const TIMED: f64 = 64.0;
 const WARM: f64 = 16.0;
-/// Time of a run between two timings, over the time that one takes.
+/// Time of a run between two timings, over the duration of one timing.
 const SELDOM: f64 = 10.0;
-/// Steps until the scene has changed.
+/// Length of the first load step, in time steps, of a scene that is timed while it is held still: longer than any measurement.
 const MOST_STEPS: f64 = 1e8;
 
-/// Two clocks: of the wall, and of the time that the processors have given to this process.
+/// Two clocks: wall time, and processor time of this process.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Clocks {
     pub wall: f64,
@@ -37,7 +36,7 @@ impl Clocks {
         Self { wall: both(self.wall, other.wall), cpu: both(self.cpu, other.cpu) }
     }
 
-    /// Mean of some.
+    /// Mean of several.
     pub(super) fn mean(of: &[Self]) -> Self {
         let sum = of.iter().fold(Self::default(), |sum, clocks| sum.with(*clocks, |a, b| a + b));
         let count = of.len() as f64;
@@ -49,13 +48,13 @@ impl Clocks {
     }
 }
 
-/// A scene to time beside a run, and what has been measured of the run.
+/// A scene to time beside a run, and the measurements of the run.
 pub(super) struct Stopwatch {
     scene: Simulation,
     start: Instant,
-    /// Seconds of a step of the scene, when last timed.
+    /// Seconds per step of the scene, as last timed.
     pace: Clocks,
-    /// The time that the last timing took.
+    /// Duration of the last timing.
     cost: Duration,
     /// When the last timing ended.
     mark: Clocks,
@@ -66,7 +65,7 @@ pub(super) struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// The scene is the case in f32, with a first load step that is so long that it stays nearly as it is built.
+    /// The scene is the case in f32, with a first load step so long that it stays nearly as built.
     ///
     /// # Errors
     /// A case that cannot be run.
@@ -101,13 +100,13 @@ impl Stopwatch {
         (self.work, self.spent) = (Clocks::default(), Clocks::default());
     }
 
-    /// Times the scene if that is due; returns the time it took.
+    /// Times the scene if due; returns the duration.
     pub(super) fn tick(&mut self) -> Duration {
         let span = self.start.elapsed().as_secs_f64() - self.mark.wall;
         if span < SELDOM * self.cost.as_secs_f64() { Duration::ZERO } else { self.lap() }
     }
 
-    /// Times the scene now; returns the time it took.
+    /// Times the scene now; returns the duration.
     pub(super) fn lap(&mut self) -> Duration {
         let (span, before) = (Clocks::now(self.start).since(self.mark), self.pace);
         self.measure();
@@ -122,10 +121,10 @@ impl Stopwatch {
         self.work
     }
 
-    /// The run has ended: its time in steps of the scene, and in s.
+    /// Ends the run; returns its time in steps of the scene, and in s.
     ///
     /// # Errors
-    /// What went wrong in the scene meanwhile.
+    /// A failure of the scene meanwhile.
     pub(super) fn stop(&mut self) -> Result<[Clocks; 2]> {
         self.lap();
         self.fault.take().map_or(Ok([self.work, self.spent]), Err)
@@ -146,7 +145,7 @@ impl Stopwatch {
         self.mark = Clocks::now(self.start);
     }
 
-    /// Some steps of the scene; returns how many.
+    /// Runs some steps of the scene; returns their number.
     fn advance(&mut self, steps: f64) -> Result<f64> {
         let before = self.scene.step();
         self.scene.advance(self.scene.time() + steps * self.scene.dt(), |_| false)?;

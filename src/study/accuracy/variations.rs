@@ -1,20 +1,20 @@
-//! The knobs that trade accuracy for time, as data: one row a point of the study.
+//! The knobs that trade accuracy for time, as data: one row per point of the study.
 
 use crate::error::{Error, Result};
 use serde_json::{Value, json};
 
-/// What becomes of a field of the case.
+/// Change of a field of the case.
 #[derive(Debug, Clone, Copy)]
 pub enum Change {
     /// This JSON, or text.
     To(&'static str),
-    /// A multiple of what it is; whole numbers stay whole.
+    /// A multiple of the old value; whole numbers stay whole.
     Times(f64),
-    /// A whole number more than it is.
+    /// The old value plus a whole number.
     Plus(i64),
 }
 
-/// A point of the study: what is changed of the case.
+/// A point of the study: the changes to the case.
 ///
 /// Fields are paths as after `--set`. `loading` and `tightening` stand for the durations of the load steps from the first shear
 /// or move on, and of those before; `--threads` and `--backend` are options of `tricot run`;
@@ -52,7 +52,7 @@ const PENALTIES: [&str; 4] = [
     "effects.contact.tie_n_mm",
 ];
 
-/// What errors are measured against: finer, in f64, with half the time step, and loaded twice as slowly.
+/// Reference for errors: finer, in f64, with half the time step, and loaded twice as slowly.
 pub const REFERENCE: Variation = variation(
     "reference",
     "reference",
@@ -65,7 +65,7 @@ pub const REFERENCE: Variation = variation(
     ],
 );
 
-/// The reference on a still finer mesh: shows whether it has converged.
+/// The reference on a still finer mesh, which shows whether the reference has converged.
 pub const CHECK: Variation = variation(
     "reference",
     "finer reference",
@@ -78,7 +78,7 @@ pub const CHECK: Variation = variation(
     ],
 );
 
-/// Runs that differ from the case by chance: everything starts up to a micrometre aside.
+/// Runs that differ from the case by chance: all bodies start up to a micrometre aside.
 pub const CHANCE: [Variation; 2] = [
     variation("chance", "a micrometre aside", &[(PERTURBATION, To("1e-3"))]),
     variation("chance", "a micrometre to the other side", &[(PERTURBATION, To("-1e-3"))]),
@@ -154,7 +154,7 @@ pub const VARIATIONS: &[Variation] = &[
     variation("fibre lines", "no fibre lines", &[("effects.fibre_lines", To("null")), (MASS, To("null"))]),
 ];
 
-/// A variation in the words of the command line.
+/// A variation as command-line options.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Flags {
     /// `--set`.
@@ -165,8 +165,8 @@ pub struct Flags {
 }
 
 impl Variation {
-    /// The flags that make it of a case with all defaults, whose loading begins behind `phases` load steps; `None` if they
-    /// change nothing or the case has no such field.
+    /// The flags that apply it to a case with all defaults, whose loading begins after `phases` load steps; `None` if they change
+    /// nothing or the case has no such field.
     pub fn flags(&self, case: &Value, phases: usize) -> Option<Flags> {
         let mut flags = Flags::default();
         for (field, change) in self.changes {
@@ -188,13 +188,13 @@ impl Variation {
 }
 
 impl Change {
-    /// The new value as after `--set`; `Some(None)` where it is the old one, `None` where that is no number to multiply.
+    /// The new value as after `--set`; `Some(None)` if it equals the old one, `None` if the old one is not a number.
     fn of(&self, old: &Value) -> Option<Option<String>> {
         let new = match self {
             To(text) => serde_json::from_str(text).unwrap_or_else(|_| json!(text)),
             Times(factor) if old.is_u64() => json!((old.as_f64()? * factor).round().max(1.0) as u64),
             Plus(more) => json!(old.as_u64()?.checked_add_signed(*more)?),
-            // digits beyond the sixth would only be noise of the multiplication
+            // digits beyond the sixth would be rounding noise
             Times(factor) => json!(format!("{:.5e}", old.as_f64()? * factor).parse::<f64>().ok()?),
         };
         let same = *old == new || old.as_f64().is_some_and(|old| new.as_f64() == Some(old));
@@ -217,7 +217,7 @@ fn places(field: &str, case: &Value, phases: usize) -> Vec<String> {
 /// The variations whose knob or label holds one of some words; all without words.
 ///
 /// # Errors
-/// A word that is nowhere.
+/// A word that matches nothing.
 pub fn chosen(words: &[String]) -> Result<Vec<&'static Variation>> {
     let fits = |variation: &Variation, word: &str| {
         let word = word.to_lowercase();

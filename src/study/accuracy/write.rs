@@ -37,7 +37,7 @@ impl Report<'_> {
         file::replace(&folder.join("accuracy.html"), |w| w.write_all(page.as_bytes()))
     }
 
-    /// One row a point; relative L2 differences, `<` before those that chance, or where nodes lie, may make.
+    /// One row per point; relative L2 differences, with `<` before those within chance or the effect of node positions.
     fn table(&self, path: &Path) -> Result<()> {
         let f = self.findings;
         let names: Vec<String> = f.measures.iter().map(|m| m.name.to_lowercase().replace(' ', "_")).collect();
@@ -91,7 +91,7 @@ impl Report<'_> {
 
     fn json(&self) -> Value {
         let f = self.findings;
-        // a difference that chance or places of nodes may make is only known to be below that
+        // a difference within chance or the effect of node positions is only known to be below that
         let differences = |list: &[Option<Difference>], claim: &dyn Fn(usize) -> Option<(f64, bool)>| {
             let value = |(k, d): (usize, &Option<Difference>)| match (d, claim(k)) {
                 (Some(_), Some((bound, false))) => json!({ "below": bound }),
@@ -219,7 +219,7 @@ impl Report<'_> {
         page.paragraph("soft", &text);
     }
 
-    /// What each knob changes of the default.
+    /// Changes that each knob makes to the default.
     fn changes(&self, page: &mut Page) {
         let f = self.findings;
         let cells = |row: &Row| {
@@ -232,7 +232,7 @@ impl Report<'_> {
         page.table(&header, &turned.map(cells).collect::<Vec<_>>());
     }
 
-    /// For a person.
+    /// The study as text.
     pub(super) fn text(&self) -> String {
         let f = self.findings;
         let shown: Vec<usize> = (0..f.measures.len()).filter(|k| !f.measures[*k].name.contains("thickness")).collect();
