@@ -13,6 +13,7 @@ use crate::output::page::Page;
 use crate::output::results::{Results, short};
 use crate::output::table::{CROSSINGS, Cell, SHEAR, Table, ZONES};
 use crate::output::{map, vtu};
+use glam::{DVec2, DVec3, Vec3Swizzles};
 use std::path::Path;
 
 /// Means over a zone leave out what is closer to its border than this share of the width of the specimen.
@@ -39,7 +40,7 @@ struct Zones {
 
 impl Zones {
     fn of(strip: &Strip, mesh: &Mesh, crossings: &Crossings) -> Self {
-        let yarns = |warp: usize, weft: usize| [warp, weft].map(|b| [mesh.blocks[b].fibre[0], mesh.blocks[b].fibre[1]]);
+        let yarns = |warp: usize, weft: usize| [warp, weft].map(|b| DVec3::from(mesh.blocks[b].fibre).xy());
         let places = || crossings.pairs.iter().map(|p| (p.reference, yarns(p.warp, p.weft)));
         let margin = MARGIN * strip.width;
         Self {
@@ -52,7 +53,7 @@ impl Zones {
 impl Crossed {
     /// Opens the tables of a scene; `None` if it has no crossings. Positive shear turns yarns towards `diagonal`; the strip between
     /// the clamps of a specimen has zones.
-    pub(super) fn of(mesh: &Mesh, diagonal: [f64; 2], strip: Option<Strip>, tables: &Tables) -> Result<Option<Self>> {
+    pub(super) fn of(mesh: &Mesh, diagonal: DVec2, strip: Option<Strip>, tables: &Tables) -> Result<Option<Self>> {
         let crossings = Crossings::of(mesh, diagonal);
         if crossings.pairs.is_empty() {
             return Ok(None);
@@ -115,13 +116,14 @@ impl Crossed {
             let zone = self.zones.as_ref().map_or("none", |zones| zones.all[i].name());
             let names = [pair.warp, pair.weft].map(|block| mesh.blocks[block].name.as_str().into());
             let degrees = [c.angle, c.direction[0], c.direction[1]].map(f64::to_degrees);
-            let numbers = [&pair.reference[..], &c.position, &degrees, &c.slip, &c.width, &c.gap].concat();
+            let (reference, position, slip) = (pair.reference.to_array(), c.position.to_array(), c.slip.to_array());
+            let numbers = [&reference[..], &position, &degrees, &slip, &c.width, &c.gap].concat();
             let cells = head.into_iter().chain([zone.into()]).chain(names);
             self.tables[1].row(&cells.chain(numbers.into_iter().map(Into::into)).collect::<Vec<_>>())?;
         }
         // yarns that cross no longer have no place on a map
         let there: Vec<usize> = (0..crossings.len()).filter(|&i| crossings[i].angle.is_finite()).collect();
-        let points: Vec<[f64; 3]> = there.iter().map(|&i| crossings[i].position).collect();
+        let points: Vec<[f64; 3]> = there.iter().map(|&i| crossings[i].position.to_array()).collect();
         let field = |name: &str, value: &dyn Fn(usize) -> f64| Field {
             name: name.into(),
             components: 1,

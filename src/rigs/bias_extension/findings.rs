@@ -13,6 +13,7 @@ use crate::output::columns::Columns;
 use crate::output::results::Results;
 use crate::output::vtu_read;
 use crate::rigs::crossings::MARGIN;
+use glam::{DVec2, DVec3, Vec3Swizzles};
 
 /// Angles of Eq. 18 at which the effective angle is stated, degrees.
 const STATED_DEG: [f64; 5] = [10.0, 20.0, 25.0, 30.0, 45.0];
@@ -101,7 +102,7 @@ fn carried(legs: &[&Leg]) -> String {
         let taut = share(own.iter().filter(|l| l.taut()).count());
         format!("{} {name} {mean:.3} N, {taut:.0} % taut", own.len())
     };
-    let along = |l: &Leg| l.chord[0].abs() > l.chord[1].abs();
+    let along = |l: &Leg| l.chord.x.abs() > l.chord.y.abs();
     [
         share("loops", &|l| l.part == Part::Loop),
         share("underlaps along the pull", &|l| l.part == Part::Underlap && along(l)),
@@ -112,8 +113,8 @@ fn carried(legs: &[&Leg]) -> String {
 }
 
 /// Direction of the fibres of a ply in the plane.
-fn direction(mesh: &Mesh, ply: Ply) -> [f64; 2] {
-    mesh.blocks.iter().find(|b| b.ply == ply).map_or([f64::NAN; 2], |b| [b.fibre[0], b.fibre[1]])
+fn direction(mesh: &Mesh, ply: Ply) -> DVec2 {
+    mesh.blocks.iter().find(|b| b.ply == ply).map_or(DVec2::NAN, |b| DVec3::from(b.fibre).xy())
 }
 
 /// The rows of the pull.

@@ -12,6 +12,7 @@ use crate::rigs::crossings::Crossed;
 use crate::rigs::observer::{Loading, Observer, Seen, Tables};
 use crate::settings::steps::Step;
 use crate::simulate::Simulation;
+use glam::DVec2;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -19,7 +20,7 @@ use std::path::Path;
 /// Angle after which the kinetic energy of shear is judged, degrees.
 const SETTLED_DEG: f64 = 2.0;
 /// Diagonal of the cell towards which positive shear turns its yarns.
-const DIAGONAL: [f64; 2] = [1.0, 1.0];
+const DIAGONAL: DVec2 = DVec2::ONE;
 /// Angles at which the last lines state F_nor, degrees, and the distance from them that counts.
 const STATED_DEG: [f64; 5] = [5.0, 15.0, 25.0, 35.0, 45.0];
 const NEAR_DEG: f64 = 1.0;
