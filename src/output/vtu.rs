@@ -246,7 +246,11 @@ fn joined(mesh: &Mesh, frame: &Frame) -> Vec<Field> {
 fn carried(mesh: &Mesh, frame: &Frame, corners: &[Seen; 8], direction: DVec3) -> DVec3 {
     let before = axes(corners.map(|seen| mesh.position(seen)));
     let after = axes(corners.map(|seen| frame.position(mesh, seen)));
-    unit(after * (before.inverse() * direction))
+    // shares of the direction in the reference axes, by Cramer's rule
+    let det = |a: DVec3, b: DVec3, c: DVec3| a.dot(b.cross(c));
+    let DMat3 { x_axis: a, y_axis: b, z_axis: c } = before;
+    let shares = DVec3::new(det(direction, b, c), det(a, direction, c), det(a, b, direction)) / det(a, b, c);
+    unit(after * shares)
 }
 
 /// Vectors along ξ, η and ζ at the centre of a hexahedron, as columns, up to a common factor.
