@@ -234,7 +234,8 @@ pub(super) fn maps(results: &Results, page: &mut Page, most: usize) -> Result<()
     let chosen: Vec<_> = (1..=count).map(|k| frames[last * k / count]).collect();
     page.heading(if several { "Crossings while the specimen is pulled" } else { "Crossings at the last frame" });
     page.raw("<div class=\"charts\">");
-    let maps: [(fn(&rows::Crossing) -> f64, &str); 3] = [
+    type Value = fn(&rows::Crossing) -> f64;
+    let maps: [(Value, &str); 3] = [
         (|c| c.effective_angle_deg, "effective shear angle, degrees"),
         (|c| c.warp_gap_mm, "gap of the warp, mm"),
         (|c| c.weft_gap_mm, "gap of the weft, mm"),

@@ -168,11 +168,11 @@ fn a_sheared_cell_follows_the_prescribed_angle() {
         "integration": { "energy_tolerance": 100 }
     });
     let mut simulation = run::simulation(&loaded(&case), BackendConfig::default()).unwrap();
-    let crossings = Crossings::of(&simulation.mesh(), DVec2::ONE);
+    let crossings = Crossings::of(simulation.mesh(), DVec2::ONE);
     advance(&mut simulation, 7e-4);
     let frame = simulation.frame();
-    let yarns = yarns::measure(&simulation.mesh(), &frame).unwrap();
-    let measured = crossings.measure(&simulation.mesh(), &frame, &yarns).unwrap();
+    let yarns = yarns::measure(simulation.mesh(), &frame).unwrap();
+    let measured = crossings.measure(simulation.mesh(), &frame, &yarns).unwrap();
     assert_eq!(measured.len(), 8);
     let spread = angles(measured.iter());
     println!("effective {:.3}° to {:.3}°", spread.min.to_degrees(), spread.max.to_degrees());

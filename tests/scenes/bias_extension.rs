@@ -66,7 +66,7 @@ fn clamps_feel_each_other_and_the_one_that_moves_does_the_work() {
     loaded.case.effects.contact_mass = None;
     let Domain::Specimen(specimen) = &loaded.case.domain else { panic!("{:?}", loaded.case.domain) };
     let mut s = run::simulation(&loaded, BackendConfig { threads: 2, ..BackendConfig::default() }).unwrap();
-    let [held, moved] = clamped(specimen, &s.mesh());
+    let [held, moved] = clamped(specimen, s.mesh());
     let nodes = s.prescribed_nodes();
     assert_eq!(nodes.len(), held.len() + moved.len());
     let pull = |reactions: &[[f64; 3]], clamp: &[usize]| -> f64 {
