@@ -92,7 +92,7 @@
 //! - **A contact law**: beside `contact::friction`; it sees one pair with its state and returns a force.
 //! - **An effect**: a flag in [`plan::Active`] that says what in a case calls for it, a const flag of the kernels it changes and the same
 //!   name for `#if` in their twins, a name and how to turn it off in [`run::effects`], a scene with and without it in `tests/physics/effects.rs`.
-//! - **A measure**: a file in `measure`, from [`mesh::Mesh`] and [`mesh::frame::Frame`]; a column in [`output::table`].
+//! - **A measure**: a file in `measure`, from [`mesh::Mesh`] and [`mesh::frame::Frame`]; a column in [`output::rows`].
 //! - **A test rig**: a folder in [`rigs`] with `impl Rig`, its piece of fabric in [`case::domain`], an arm in [`rigs::of`] and [`rigs::of_mut`].
 //! - **A knob of accuracy**: a row in [`study::accuracy::variations`].
 //! - **A scene**: a JSON file in `cases/`. `tricot schema` lists every field.

@@ -18,7 +18,7 @@ pub fn check(case: &Case, provenance: &Provenance) -> Result<()> {
     probes(case, provenance)
 }
 
-/// Refuses duplicate names and names that a table cannot hold.
+/// Refuses duplicate names and names with line breaks or control characters.
 pub fn distinct<'a>(
     names: impl Iterator<Item = (String, &'a String)>,
     what: &str,
@@ -28,9 +28,6 @@ pub fn distinct<'a>(
     for (path, name) in names {
         if name.chars().any(char::is_control) {
             return Err(provenance.error(&path, "holds a line break or control character, write one line"));
-        }
-        if name.contains([',', '"']) {
-            return Err(provenance.error(&path, "holds a comma or a quote, which tables cannot: leave it out"));
         }
         if let Some(first) = known.insert(name, path.clone()) {
             return Err(

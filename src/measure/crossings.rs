@@ -16,6 +16,7 @@ use super::yarns::Yarn;
 use crate::error::{Error, Result};
 use crate::mesh::frame::Frame;
 use crate::mesh::{Block, Mesh, Ply};
+use glam::{DVec2, DVec3, Vec3Swizzles};
 
 /// Periodic images that are looked at, in cells to each side.
 const REACH: i32 = 2;
@@ -29,7 +30,7 @@ pub struct Pair {
     pub warp: usize,
     pub weft: usize,
     /// Where they cross in the reference state, mm.
-    pub reference: [f64; 2],
+    pub reference: DVec2,
     /// Image of the warp, in periods, where it crosses the weft.
     image: [i32; 2],
     /// Places along warp and weft, in slices.
@@ -45,13 +46,13 @@ pub struct Pair {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
     /// Where the mid-lines cross, mm; NaN if they do no longer.
-    pub position: [f64; 3],
+    pub position: DVec3,
     /// Effective shear angle, rad; NaN if the mid-lines cross no longer.
     pub angle: f64,
     /// Directions of warp and weft along the axis, rad from x; NaN as well.
     pub direction: [f64; 2],
     /// Way of the weft's material point from the warp's, mm.
-    pub slip: [f64; 2],
+    pub slip: DVec2,
     /// Width and gap of warp and weft at their nearest stations, mm.
     pub width: [f64; 2],
     pub gap: [f64; 2],
@@ -66,7 +67,7 @@ pub struct Crossings {
 impl Crossings {
     /// Crossings of a mesh. Shear is positive where it turns the yarns towards `axis`: the direction of the pull, or the
     /// diagonal (1, 1) of a cell.
-    pub fn of(mesh: &Mesh, axis: [f64; 2]) -> Self {
+    pub fn of(mesh: &Mesh, axis: DVec2) -> Self {
         let frame = Frame { gradient: [[1.0, 0.0], [0.0, 1.0]], positions: mesh.nodes.clone(), ..Frame::default() };
         let lines = midlines(mesh, &frame);
         let mut pairs = Vec::new();
@@ -76,8 +77,8 @@ impl Crossings {
                 continue;
             };
             let directions = [lines[warp].direction(at[0]), lines[weft].direction(at[1])];
-            let signs = directions.map(|d| if dot(d, axis) < 0.0 { -1.0 } else { 1.0 });
-            let side = (signs[0] * signs[1] * cross(directions[0], directions[1])).signum();
+            let signs = directions.map(|d| if d.dot(axis) < 0.0 { -1.0 } else { 1.0 });
+            let side = (signs[0] * signs[1] * directions[0].perp_dot(directions[1])).signum();
             let rest = turn(directions, signs, side);
             pairs.push(Pair { warp, weft, reference: place, image, at, signs, side, rest });
         }
@@ -98,23 +99,23 @@ impl Crossings {
         let period = mesh.period.unwrap_or_default();
         let crossing = |pair: &Pair| {
             let both = [&lines[pair.warp], &lines[pair.weft]];
-            let [x, y, _] = frame.shift(period, pair.image);
+            let shift = DVec3::from(frame.shift(period, pair.image));
             let (a, b) = (both[0].point(pair.at[0]), both[1].point(pair.at[1]));
-            let slip = [b[0] - a[0] - x, b[1] - a[1] - y];
-            let off = |hit: &Hit| (hit.place[0] - b[0] + 0.5 * slip[0]).hypot(hit.place[1] - b[1] + 0.5 * slip[1]);
+            let slip = (b - a - shift).xy();
+            let off = |hit: &Hit| length(hit.place - b.xy() + 0.5 * slip);
             let hit = hits(both, mesh, frame).into_iter().min_by(|p, q| off(p).total_cmp(&off(q)));
             let now = hit.as_ref().map_or(pair.at, |h| h.at);
             let stations = [(pair.warp, now[0]), (pair.weft, now[1])];
             let nearest = stations.map(|(block, at)| (&yarns[block], station(&mesh.blocks[block], at)));
             let size =
                 |values: fn(&Yarn) -> &Vec<f64>| nearest.map(|(y, s)| values(y).get(s).copied().unwrap_or(f64::NAN));
-            let nowhere = ([f64::NAN; 3], f64::NAN, [f64::NAN; 2]);
+            let nowhere = (DVec3::NAN, f64::NAN, [f64::NAN; 2]);
             let (position, angle, direction) = hit.map_or(nowhere, |Hit { at, place, .. }| {
                 let directions = [both[0].direction(at[0]), both[1].direction(at[1])];
-                let height = 0.5 * (both[0].point(at[0])[2] + both[1].point(at[1])[2]);
+                let height = 0.5 * (both[0].point(at[0]).z + both[1].point(at[1]).z);
                 let angle = turn(directions, pair.signs, pair.side) - pair.rest;
-                let along = [0, 1].map(|ply| directions[ply].map(|d| pair.signs[ply] * d)).map(|[x, y]| y.atan2(x));
-                ([place[0], place[1], height], angle, along)
+                let along = [0, 1].map(|ply| (pair.signs[ply] * directions[ply]).to_angle());
+                (place.extend(height), angle, along)
             });
             Crossing { position, angle, direction, slip, width: size(|y| &y.width), gap: size(|y| &y.gap) }
         };
@@ -153,7 +154,7 @@ fn between(points: &[[f64; 2]], at: f64) -> f64 {
 impl Crossing {
     /// Size of the slip, mm.
     pub fn slipped(&self) -> f64 {
-        self.slip[0].hypot(self.slip[1])
+        length(self.slip)
     }
 }
 
@@ -174,8 +175,8 @@ fn candidates(mesh: &Mesh) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// 90° less the angle between two directions, once signs have made them point along the axis.
-fn turn([a, b]: [[f64; 2]; 2], [p, q]: [f64; 2], side: f64) -> f64 {
-    (p * q * dot(a, b)).atan2(side * p * q * cross(a, b))
+fn turn([a, b]: [DVec2; 2], [p, q]: [f64; 2], side: f64) -> f64 {
+    (p * q * a.dot(b)).atan2(side * p * q * a.perp_dot(b))
 }
 
 /// Index of the station nearest to a place along a block, among those that yarns are measured at.
@@ -189,11 +190,11 @@ fn station(block: &Block, at: f64) -> usize {
 
 /// A mid-line at slice boundaries 0 ..= slices, mm.
 struct Midline {
-    points: Vec<[f64; 3]>,
+    points: Vec<DVec3>,
     /// Not of unit length.
-    directions: Vec<[f64; 2]>,
-    low: [f64; 2],
-    high: [f64; 2],
+    directions: Vec<DVec2>,
+    low: DVec2,
+    high: DVec2,
 }
 
 fn midlines(mesh: &Mesh, frame: &Frame) -> Vec<Midline> {
@@ -205,26 +206,20 @@ impl Midline {
         let count = block.lines() as f64;
         let section = |s: usize| {
             let nodes = (0..=block.layers).flat_map(|k| (0..=block.columns).map(move |j| block.node(s, j, k)));
-            let sum = nodes.fold([0.0; 3], |sum: [f64; 3], seen| {
-                let p = frame.position(mesh, seen);
-                [0, 1, 2].map(|k| sum[k] + p[k])
-            });
-            sum.map(|x| x / count)
+            nodes.map(|seen| DVec3::from(frame.position(mesh, seen))).sum::<DVec3>() / count
         };
-        let points: Vec<[f64; 3]> = (0..=block.slices).map(section).collect();
+        let points: Vec<DVec3> = (0..=block.slices).map(section).collect();
         let last = block.slices;
-        let along = |a: usize, b: usize| [points[b][0] - points[a][0], points[b][1] - points[a][1]];
+        let along = |a: usize, b: usize| (points[b] - points[a]).xy();
         let direction = |s: usize| match block.wrap {
             // across the seam, the section before the first is the last but one, one turn back
-            Some(_) if s == 0 || s == last => {
-                let (start, end) = (along(0, 1), along(last - 1, last));
-                [start[0] + end[0], start[1] + end[1]]
-            }
+            Some(_) if s == 0 || s == last => along(0, 1) + along(last - 1, last),
             _ => along(s.saturating_sub(1), (s + 1).min(last)),
         };
         let directions = (0..=last).map(direction).collect();
-        let extreme = |pick: fn(f64, f64) -> f64| [0, 1].map(|k| points.iter().map(|p| p[k]).fold(f64::NAN, pick));
-        Self { low: extreme(f64::min), high: extreme(f64::max), directions, points }
+        let low = points.iter().fold(DVec2::INFINITY, |low, p| p.xy().min(low));
+        let high = points.iter().fold(DVec2::NEG_INFINITY, |high, p| p.xy().max(high));
+        Self { low, high, directions, points }
     }
 
     /// Slice and share of it at a place along the line.
@@ -233,16 +228,16 @@ impl Midline {
         (slice, at - slice as f64)
     }
 
-    fn point(&self, at: f64) -> [f64; 3] {
+    fn point(&self, at: f64) -> DVec3 {
         let (s, t) = self.split(at);
-        [0, 1, 2].map(|k| self.points[s][k] + t * (self.points[s + 1][k] - self.points[s][k]))
+        self.points[s] + t * (self.points[s + 1] - self.points[s])
     }
 
     /// Unit direction at a place.
-    fn direction(&self, at: f64) -> [f64; 2] {
+    fn direction(&self, at: f64) -> DVec2 {
         let (s, t) = self.split(at);
         let [a, b] = [self.directions[s], self.directions[s + 1]].map(unit);
-        unit([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])])
+        unit(a + t * (b - a))
     }
 }
 
@@ -252,7 +247,7 @@ struct Hit {
     image: [i32; 2],
     /// Places along both lines, in slices.
     at: [f64; 2],
-    place: [f64; 2],
+    place: DVec2,
 }
 
 /// All crossings of a warp, in the images around, with a weft.
@@ -261,23 +256,20 @@ fn hits([warp, weft]: [&Midline; 2], mesh: &Mesh, frame: &Frame) -> Vec<Hit> {
     let images = (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| [i, j]));
     let mut found = Vec::new();
     for image in images {
-        let [x, y, _] = frame.shift(mesh.period.unwrap_or_default(), image);
-        let shift = [x, y];
-        let apart = (0..2).any(|k| warp.high[k] + shift[k] < weft.low[k] || warp.low[k] + shift[k] > weft.high[k]);
-        if apart {
+        let shift = DVec3::from(frame.shift(mesh.period.unwrap_or_default(), image)).xy();
+        if (warp.high + shift).cmplt(weft.low).any() || (warp.low + shift).cmpgt(weft.high).any() {
             continue;
         }
         for (s, a) in warp.points.windows(2).enumerate() {
-            let [p, r] = [[a[0][0] + x, a[0][1] + y], [a[1][0] - a[0][0], a[1][1] - a[0][1]]];
+            let (p, r) = (a[0].xy() + shift, (a[1] - a[0]).xy());
             for (t, b) in weft.points.windows(2).enumerate() {
-                let u = [b[1][0] - b[0][0], b[1][1] - b[0][1]];
-                let between = [b[0][0] - p[0], b[0][1] - p[1]];
-                let area = cross(r, u);
-                let [m, n] = [cross(between, u) / area, cross(between, r) / area];
+                let u = (b[1] - b[0]).xy();
+                let between = b[0].xy() - p;
+                let area = r.perp_dot(u);
+                let [m, n] = [between.perp_dot(u) / area, between.perp_dot(r) / area];
                 let inside = -MARGIN..=1.0 + MARGIN;
                 if inside.contains(&m) && inside.contains(&n) {
-                    let place = [p[0] + m * r[0], p[1] + m * r[1]];
-                    found.push(Hit { image, at: [s as f64 + m, t as f64 + n], place });
+                    found.push(Hit { image, at: [s as f64 + m, t as f64 + n], place: p + m * r });
                 }
             }
         }
@@ -285,17 +277,13 @@ fn hits([warp, weft]: [&Midline; 2], mesh: &Mesh, frame: &Frame) -> Vec<Hit> {
     found
 }
 
-fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
+/// Without overflow in between.
+fn length(v: DVec2) -> f64 {
+    v.x.hypot(v.y)
 }
 
-fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
-    a[0] * b[1] - a[1] * b[0]
-}
-
-fn unit([x, y]: [f64; 2]) -> [f64; 2] {
-    let length = x.hypot(y);
-    [x / length, y / length]
+fn unit(v: DVec2) -> DVec2 {
+    v / length(v)
 }
 
 #[cfg(test)]
@@ -310,13 +298,13 @@ mod tests {
         let mut frame = sample::frame(&mesh, gradient);
         change(&mesh, &mut frame);
         let yarns = yarns::measure(&mesh, &frame).unwrap();
-        Crossings::of(&mesh, [1.0, 1.0]).measure(&mesh, &frame, &yarns).unwrap()
+        Crossings::of(&mesh, DVec2::ONE).measure(&mesh, &frame, &yarns).unwrap()
     }
 
     #[test]
     fn every_warp_crosses_every_weft_once_a_cell() {
         let mesh = sample::plies();
-        let pairs = Crossings::of(&mesh, [1.0, 1.0]).pairs;
+        let pairs = Crossings::of(&mesh, DVec2::ONE).pairs;
         assert_eq!(pairs.len(), 8);
         for p in pairs {
             let wanted = [-5.0 + 5.0 * p.warp as f64, -3.75 + 2.5 * (p.weft - 2) as f64];
@@ -337,7 +325,7 @@ mod tests {
                 let images = [1, 0].map(|k| gradient[1][k].atan2(gradient[0][k]));
                 let off = [0, 1].map(|ply| (c.direction[ply] - images[ply]).sin().abs());
                 assert!(off.iter().all(|o| *o < 1e-12), "{:?} {images:?}", c.direction);
-                assert!(c.slipped() < 1e-12 && c.position.iter().all(|x| x.is_finite()));
+                assert!(c.slipped() < 1e-12 && c.position.is_finite());
             }
         }
         let flat = measured(trellis(0.0), |_, _| {});
@@ -364,7 +352,7 @@ mod tests {
     fn values_go_linearly_from_crossing_to_crossing_along_each_yarn() {
         let mesh = sample::plies();
         let crossings = measured(trellis(0.2), |_, _| {});
-        let all = Crossings::of(&mesh, [1.0, 1.0]);
+        let all = Crossings::of(&mesh, DVec2::ONE);
         let same = all.along_yarns(&mesh, &crossings, |c| c.angle);
         assert_eq!(same.len(), mesh.hexes());
         assert!(same.iter().all(|a| (a - 0.2).abs() < 1e-12));
@@ -377,7 +365,7 @@ mod tests {
     fn yarns_of_another_mesh_are_refused() {
         let mesh = sample::plies();
         let frame = sample::frame(&mesh, trellis(0.0));
-        let error = Crossings::of(&mesh, [1.0, 1.0]).measure(&mesh, &frame, &[]).unwrap_err();
+        let error = Crossings::of(&mesh, DVec2::ONE).measure(&mesh, &frame, &[]).unwrap_err();
         assert!(error.to_string().contains("0 yarns"));
     }
 }

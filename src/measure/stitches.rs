@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::mesh::{Mesh, Part, Thread};
+use glam::{DVec2, DVec3, Vec3Swizzles};
 
 /// Axial force below which a beam counts as slack, N.
 pub const SLACK_BELOW_N: f64 = 0.02;
@@ -36,8 +37,8 @@ pub struct Stitches {
 pub struct Leg {
     pub part: Part,
     /// Middle between its ends and the way from one to the other in the reference state, mm.
-    pub middle: [f64; 2],
-    pub chord: [f64; 2],
+    pub middle: DVec2,
+    pub chord: DVec2,
     /// Mean axial force, weighted by reference length, N; compression is negative.
     pub force_n: f64,
 }
@@ -68,13 +69,9 @@ pub fn legs(mesh: &Mesh, forces: &[f64]) -> Result<Vec<Leg>> {
                 length += own;
                 sum += own * forces[first + i];
             }
-            let [from, to] = [thread.beam(start)[0], thread.beam(end - 1)[1]].map(|seen| mesh.position(seen));
-            legs.push(Leg {
-                part: part(start),
-                middle: [0, 1].map(|k| 0.5 * (from[k] + to[k])),
-                chord: [0, 1].map(|k| to[k] - from[k]),
-                force_n: sum / length,
-            });
+            let ends = [thread.beam(start)[0], thread.beam(end - 1)[1]];
+            let [from, to] = ends.map(|seen| DVec3::from(mesh.position(seen)).xy());
+            legs.push(Leg { part: part(start), middle: 0.5 * (from + to), chord: to - from, force_n: sum / length });
             start = end;
         }
         first += thread.beams();
@@ -84,8 +81,8 @@ pub fn legs(mesh: &Mesh, forces: &[f64]) -> Result<Vec<Leg>> {
 
 /// Reference length of a beam, mm.
 fn beam_length(mesh: &Mesh, thread: &Thread, beam: usize) -> f64 {
-    let [a, b] = thread.beam(beam).map(|seen| mesh.position(seen));
-    (0..3).map(|k| (b[k] - a[k]).powi(2)).sum::<f64>().sqrt()
+    let [a, b] = thread.beam(beam).map(|seen| DVec3::from(mesh.position(seen)));
+    a.distance(b)
 }
 
 /// An error unless every beam has a force that is a number.
@@ -190,7 +187,7 @@ mod tests {
     fn a_leg_is_a_run_of_beams_of_one_part() {
         let found = legs(&mesh(), &[0.4, -0.1, 0.01, 0.3]).unwrap();
         assert_eq!(found.iter().map(|l| l.part).collect::<Vec<_>>(), [Part::Loop, Part::Underlap]);
-        assert_eq!((found[0].middle, found[0].chord), ([1.5, 0.0], [3.0, 0.0]));
+        assert_eq!((found[0].middle, found[0].chord), (DVec2::new(1.5, 0.0), DVec2::new(3.0, 0.0)));
         assert!((found[0].force_n - 0.2 / 3.0).abs() < 1e-15 && found[0].taut());
         assert!((found[1].force_n - 1.23 / 7.0).abs() < 1e-15);
         assert!(!legs(&mesh(), &[0.0, 0.02, 0.0, 0.0]).unwrap()[0].taut());

@@ -16,7 +16,8 @@
 use super::Spread;
 use crate::error::Result;
 use crate::mesh::frame::Frame;
-use crate::mesh::{Block, Mesh, Ply};
+use crate::mesh::{Block, Mesh, Ply, Seen};
+use glam::{DVec2, DVec3, Vec3Swizzles};
 
 /// Sizes of one yarn at its stations, mm.
 #[derive(Debug, Clone)]
@@ -70,17 +71,16 @@ pub fn measure(mesh: &Mesh, frame: &Frame) -> Result<Vec<Yarn>> {
     frame.check(mesh)?;
     let outlines: Vec<Outline> = mesh.blocks.iter().map(|b| Outline::of(mesh, frame, b)).collect();
     let reach = if mesh.period.is_some() { 2 } else { 0 };
-    let shifts: Vec<[f64; 2]> = (-reach..=reach)
+    let shifts: Vec<DVec2> = (-reach..=reach)
         .flat_map(|i| (-reach..=reach).map(move |j| [i, j]))
-        .map(|image| frame.shift(mesh.period.unwrap_or_default(), image))
-        .map(|[x, y, _]| [x, y])
+        .map(|image| DVec3::from(frame.shift(mesh.period.unwrap_or_default(), image)).xy())
         .collect();
     let yarn = |(index, block): (usize, &Block)| {
         let outline = &outlines[index];
-        let neighbours: Vec<(&Outline, [f64; 2])> = (0..mesh.blocks.len())
+        let neighbours: Vec<(&Outline, DVec2)> = (0..mesh.blocks.len())
             .filter(|&other| mesh.blocks[other].ply == block.ply)
             .flat_map(|other| shifts.iter().map(move |&shift| (other, shift)))
-            .filter(|&(other, shift)| other != index || shift != [0.0; 2])
+            .filter(|&(other, shift)| other != index || shift != DVec2::ZERO)
             .map(|(other, shift)| (&outlines[other], shift))
             .collect();
         let stations = if block.wrap.is_some() { 0..block.slices } else { 1..block.slices };
@@ -105,35 +105,33 @@ fn thickness(mesh: &Mesh, frame: &Frame, block: &Block, station: usize) -> f64 {
 
 /// A yarn seen along z: centreline and edges at slice boundaries 0 ..= slices, mm.
 struct Outline {
-    centre: Vec<[f64; 2]>,
-    normal: Vec<[f64; 2]>,
+    centre: Vec<DVec2>,
+    normal: Vec<DVec2>,
     /// Outermost nodes on the −n and on the +n side.
-    edges: [Vec<[f64; 2]>; 2],
+    edges: [Vec<DVec2>; 2],
 }
 
 impl Outline {
     fn of(mesh: &Mesh, frame: &Frame, block: &Block) -> Self {
-        let section = |s: usize| -> Vec<[f64; 2]> {
-            (0..=block.layers)
-                .flat_map(|k| (0..=block.columns).map(move |j| block.node(s, j, k)))
-                .map(|seen| frame.position(mesh, seen))
-                .map(|[x, y, _]| [x, y])
-                .collect()
+        let place = |seen: Seen| DVec3::from(frame.position(mesh, seen)).xy();
+        let section = |s: usize| -> Vec<DVec2> {
+            let nodes = (0..=block.layers).flat_map(|k| (0..=block.columns).map(move |j| block.node(s, j, k)));
+            nodes.map(place).collect()
         };
         let sections: Vec<_> = (0..=block.slices).map(section).collect();
-        let centre: Vec<[f64; 2]> = sections.iter().map(|s| mean(s)).collect();
+        let centre: Vec<DVec2> = sections.iter().map(|s| s.iter().sum::<DVec2>() / s.len() as f64).collect();
         // Across the seam of a closed yarn, the section before the first is the last but one, one turn back.
-        let turn = sub(centre[block.slices], centre[0]);
+        let turn = centre[block.slices] - centre[0];
         let tangent = |s: usize| {
             let last = block.slices;
             match block.wrap {
-                Some(_) if s == 0 || s == last => add(sub(centre[1], centre[last - 1]), turn),
-                _ => sub(centre[(s + 1).min(last)], centre[s.saturating_sub(1)]),
+                Some(_) if s == 0 || s == last => centre[1] - centre[last - 1] + turn,
+                _ => centre[(s + 1).min(last)] - centre[s.saturating_sub(1)],
             }
         };
-        let normal: Vec<[f64; 2]> = (0..=block.slices).map(tangent).map(turned).collect();
+        let normal: Vec<DVec2> = (0..=block.slices).map(tangent).map(turned).collect();
         let outermost = |sign: f64| {
-            let reach = |p: &[f64; 2], s: usize| sign * dot(*p, normal[s]);
+            let reach = |p: &DVec2, s: usize| sign * p.dot(normal[s]);
             let outer = |s: usize| sections[s].iter().max_by(|a, b| reach(a, s).total_cmp(&reach(b, s)));
             (0..=block.slices).map(|s| outer(s).copied().unwrap_or(centre[s])).collect()
         };
@@ -141,18 +139,18 @@ impl Outline {
     }
 
     fn width(&self, s: usize) -> f64 {
-        dot(sub(self.edges[1][s], self.edges[0][s]), self.normal[s])
+        (self.edges[1][s] - self.edges[0][s]).dot(self.normal[s])
     }
 
     /// From the +n edge at a station to the nearest facing edge beyond the centre of the own section.
-    fn gap(&self, s: usize, neighbours: &[(&Outline, [f64; 2])]) -> f64 {
+    fn gap(&self, s: usize, neighbours: &[(&Outline, DVec2)]) -> f64 {
         let (edge, n) = (self.edges[1][s], self.normal[s]);
-        let least = dot(sub(self.centre[s], edge), n);
+        let least = (self.centre[s] - edge).dot(n);
         let mut nearest = f64::NAN;
         for (other, shift) in neighbours {
             for (chain, side) in other.edges.iter().zip([1.0, -1.0]) {
-                let facing = |segment: usize| side * dot(n, other.normal[segment]) > 0.0;
-                if let Some((gap, segment)) = crossing(chain, sub(edge, *shift), n, least)
+                let facing = |segment: usize| side * n.dot(other.normal[segment]) > 0.0;
+                if let Some((gap, segment)) = crossing(chain, edge - *shift, n, least)
                     && facing(segment)
                 {
                     nearest = gap.min(nearest);
@@ -164,9 +162,9 @@ impl Outline {
 }
 
 /// Smallest distance above `least` from `start` along `n` at which a chain of points is crossed, and the crossed segment.
-fn crossing(chain: &[[f64; 2]], start: [f64; 2], n: [f64; 2], least: f64) -> Option<(f64, usize)> {
-    let along = |p: [f64; 2]| dot(sub(p, start), [n[1], -n[0]]);
-    let across = |p: [f64; 2]| dot(sub(p, start), n);
+fn crossing(chain: &[DVec2], start: DVec2, n: DVec2, least: f64) -> Option<(f64, usize)> {
+    let along = |p: DVec2| (p - start).perp_dot(n);
+    let across = |p: DVec2| (p - start).dot(n);
     chain
         .windows(2)
         .enumerate()
@@ -181,28 +179,9 @@ fn crossing(chain: &[[f64; 2]], start: [f64; 2], n: [f64; 2], least: f64) -> Opt
         .min_by(|x, y| x.0.total_cmp(&y.0))
 }
 
-fn mean(points: &[[f64; 2]]) -> [f64; 2] {
-    let [x, y] = points.iter().fold([0.0; 2], |sum, p| add(sum, *p));
-    let count = points.len() as f64;
-    [x / count, y / count]
-}
-
 /// Unit vector at +90° to `v`.
-fn turned([x, y]: [f64; 2]) -> [f64; 2] {
-    let length = x.hypot(y);
-    [-y / length, x / length]
-}
-
-fn add(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0] + b[0], a[1] + b[1]]
-}
-
-fn sub(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0] - b[0], a[1] - b[1]]
-}
-
-fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
+fn turned(v: DVec2) -> DVec2 {
+    v.perp() / v.x.hypot(v.y)
 }
 
 #[cfg(test)]

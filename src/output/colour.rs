@@ -3,8 +3,10 @@
 //! OKLab after B. Ottosson (2020), <https://bottosson.github.io/posts/oklab/>. The map rises evenly in lightness from violet
 //! over blue and green to yellow, so that equal steps of a field look equal, also in print without colour.
 
+use glam::Vec3;
+
 /// Linear RGB, 0 to 1.
-pub type Rgb = [f32; 3];
+pub type Rgb = Vec3;
 
 /// Linear RGB of a lightness (0 to 1), chroma (about 0 to 0.2) and hue in degrees, clipped to what a screen can show.
 pub fn oklch(lightness: f32, chroma: f32, hue_deg: f32) -> Rgb {
@@ -13,12 +15,12 @@ pub fn oklch(lightness: f32, chroma: f32, hue_deg: f32) -> Rgb {
     let l = (lightness + 0.396_337_78 * a + 0.215_803_76 * b).powi(3);
     let m = (lightness - 0.105_561_346 * a - 0.063_854_17 * b).powi(3);
     let s = (lightness - 0.089_484_18 * a - 1.291_485_5 * b).powi(3);
-    let rgb = [
+    let rgb = Rgb::new(
         4.076_741_7 * l - 3.307_711_6 * m + 0.230_969_93 * s,
         -1.268_438 * l + 2.609_757_4 * m - 0.341_319_4 * s,
         -0.004_196_086 * l - 0.703_418_6 * m + 1.707_614_7 * s,
-    ];
-    rgb.map(|v| v.clamp(0.0, 1.0))
+    );
+    rgb.clamp(Rgb::ZERO, Rgb::ONE)
 }
 
 /// Colour of a field value at a share of its range; ends are clamped, NaN is grey.
@@ -32,7 +34,7 @@ pub fn map(share: f32) -> Rgb {
 
 /// Bytes of a linear colour in the standard encoding of screens.
 pub fn encode(colour: Rgb) -> [u8; 3] {
-    colour.map(|v| {
+    colour.to_array().map(|v| {
         let v = v.clamp(0.0, 1.0);
         let v = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
         (v * 255.0).round() as u8
@@ -79,7 +81,8 @@ mod tests {
     use super::*;
 
     /// OKLab lightness of linear RGB.
-    fn lightness([r, g, b]: Rgb) -> f32 {
+    fn lightness(colour: Rgb) -> f32 {
+        let [r, g, b] = colour.to_array();
         let l = (0.412_221_46 * r + 0.536_332_55 * g + 0.051_445_995 * b).cbrt();
         let m = (0.211_903_5 * r + 0.680_699_5 * g + 0.107_396_96 * b).cbrt();
         let s = (0.088_302_46 * r + 0.281_718_85 * g + 0.629_978_7 * b).cbrt();
@@ -98,7 +101,7 @@ mod tests {
     #[test]
     fn white_and_ends() {
         assert_eq!(encode(oklch(1.0, 0.0, 0.0)), [255, 255, 255]);
-        assert_eq!(encode([0.0; 3]), [0, 0, 0]);
+        assert_eq!(encode(Rgb::ZERO), [0, 0, 0]);
         assert_eq!(map(-1.0), map(0.0));
         assert_eq!(map(f32::NAN), oklch(0.78, 0.0, 0.0));
     }

@@ -1,25 +1,34 @@
-//! Tables read back by the names of their columns.
+//! Tables read back, by the names of their columns or as the rows that were written.
 
 use crate::case::parse::reason;
 use crate::error::{Error, Result};
+use csv::{ReaderBuilder, StringRecord};
+use serde::de::DeserializeOwned;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A table in memory. Lines that a stopped run left half written are not part of it.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Columns {
-    header: Vec<String>,
-    rows: Vec<Vec<String>>,
+    path: PathBuf,
+    header: StringRecord,
+    rows: Vec<StringRecord>,
 }
 
 impl Columns {
-    /// Reads a CSV file that [`Table`](super::table::Table) wrote.
+    /// Reads a CSV file that [`Table`](super::table::Table) or [`Named`](super::table::Named) wrote.
     pub fn read(path: &Path) -> Result<Self> {
+        let failed = |e: csv::Error| Error::file(path, e.to_string());
         let text = fs::read_to_string(path).map_err(|e| Error::file(path, reason(&e)))?;
-        let mut rows = text.lines().map(|l| l.split(',').map(String::from).collect::<Vec<_>>());
-        let header = rows.next().ok_or_else(|| Error::file(path, "the table has no header"))?;
-        let rows = rows.filter(|row| row.len() == header.len()).collect();
-        Ok(Self { header, rows })
+        let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+        let mut reader = ReaderBuilder::new().flexible(true).from_reader(whole.as_bytes());
+        let header = reader.headers().map_err(failed)?.clone();
+        if header.is_empty() {
+            return Err(Error::file(path, "the table has no header"));
+        }
+        let rows: Vec<StringRecord> = reader.into_records().collect::<csv::Result<_>>().map_err(failed)?;
+        let rows = rows.into_iter().filter(|row| row.len() == header.len()).collect();
+        Ok(Self { path: path.to_path_buf(), header, rows })
     }
 
     /// Number of rows.
@@ -31,10 +40,24 @@ impl Columns {
         self.rows.is_empty()
     }
 
+    /// Names of the columns.
+    pub fn names(&self) -> Vec<&str> {
+        self.header.iter().collect()
+    }
+
+    /// The rows as a type whose fields are among the columns.
+    ///
+    /// # Errors
+    /// A column that is missing, or a cell that is none of its field.
+    pub fn rows<R: DeserializeOwned>(&self) -> Result<Vec<R>> {
+        let row = |row: &StringRecord| row.deserialize(Some(&self.header));
+        self.rows.iter().map(row).collect::<csv::Result<_>>().map_err(|e| Error::file(&self.path, e.to_string()))
+    }
+
     /// A column as it is written; empty if there is none of this name.
     pub fn texts(&self, name: &str) -> Vec<&str> {
         let at = self.header.iter().position(|h| h == name);
-        at.map_or_else(Vec::new, |at| self.rows.iter().map(|row| row[at].as_str()).collect())
+        at.map_or_else(Vec::new, |at| self.rows.iter().map(|row| &row[at]).collect())
     }
 
     /// A column as numbers; what is none is NaN.

@@ -32,7 +32,7 @@ impl Image {
             return;
         }
         let pixel = &mut self.pixels[y as usize * self.width + x as usize];
-        *pixel = std::array::from_fn(|i| pixel[i] + share * (colour[i] - pixel[i]));
+        *pixel += share * (colour - *pixel);
     }
 
     /// Fills a rectangle given by its left, top, width and height, px.
@@ -80,8 +80,8 @@ mod tests {
 
     #[test]
     fn png_reads_back() {
-        let mut image = Image::new(5, 4, [1.0; 3]);
-        image.fill([1.0, 1.0, 2.0, 1.0], [0.0; 3]);
+        let mut image = Image::new(5, 4, Rgb::ONE);
+        image.fill([1.0, 1.0, 2.0, 1.0], Rgb::ZERO);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         image.write_png(&path).unwrap();
@@ -96,9 +96,9 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_left_out() {
-        let mut image = Image::new(3, 2, [0.0; 3]);
-        image.paste(1, 1, &Image::new(5, 2, [1.0; 3]));
-        let bright = (0..6).filter(|i| image.pixel(i % 3, i / 3) == [1.0; 3]).collect::<Vec<_>>();
+        let mut image = Image::new(3, 2, Rgb::ZERO);
+        image.paste(1, 1, &Image::new(5, 2, Rgb::ONE));
+        let bright = (0..6).filter(|i| image.pixel(i % 3, i / 3) == Rgb::ONE).collect::<Vec<_>>();
         assert_eq!(bright, [4, 5]);
     }
 }

@@ -11,6 +11,7 @@ use super::text;
 use crate::error::{Error, Result};
 use crate::mesh::frame::Frame;
 use crate::mesh::{Mesh, Ply};
+use glam::{DVec3, Vec2, Vec2Swizzles, Vec3, Vec3Swizzles};
 use std::ops::RangeInclusive;
 
 /// Lengths of the periodic cell that a view shows.
@@ -63,7 +64,7 @@ pub fn render(mesh: &Mesh, frame: &Frame, view: &View) -> Result<Image> {
     sheet.line(&mut image, sheet.margin, 0.45 * sheet.margin, TITLE.min(room), &view.title);
     sheet.line(&mut image, beside, 0.45 * sheet.margin + 0.5 * sheet.letters, 1.0, &state);
 
-    let scale = sheet.panel[0] as f32 / stage.size()[0];
+    let scale = sheet.panel[0] as f32 / stage.size().x;
     for (k, (axes, caption)) in FACES.into_iter().enumerate() {
         let left = sheet.margin as usize + k * (sheet.panel[0] + sheet.margin as usize);
         sheet.face(&mut image, &scene, &stage, [left, sheet.top()], sheet.panel, (axes, scale));
@@ -73,9 +74,8 @@ pub fn render(mesh: &Mesh, frame: &Frame, view: &View) -> Result<Image> {
     if view.oblique {
         let axes = oblique();
         let place = [sheet.margin as usize, (sheet.captions() + 2.0 * sheet.letters) as usize];
-        let [width, height] = stage.size();
-        let seen = |axis: [f32; 3]| axis[0].abs() * width + axis[1].abs() * height + axis[2].abs() * stage.thickness;
-        let [across, up, _] = axes.map(seen);
+        let size = stage.size().extend(stage.thickness);
+        let [across, up, _] = axes.map(|axis| axis.abs().dot(size));
         let scale = (sheet.wide[0] as f32 / across).min(sheet.wide[1] as f32 / up);
         sheet.face(&mut image, &scene, &stage, place, sheet.wide, (axes, 0.99 * scale));
     }
@@ -87,17 +87,17 @@ pub fn render(mesh: &Mesh, frame: &Frame, view: &View) -> Result<Image> {
 }
 
 /// Axes of the two faces (to the right, up, toward the viewer) and their captions.
-const FACES: [([[f32; 3]; 3], &str); 2] = [
-    ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], "zig-zag face, from +z"),
-    ([[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]], "looped face, from −z (turned over)"),
+const FACES: [([Vec3; 3], &str); 2] = [
+    ([Vec3::X, Vec3::Y, Vec3::Z], "zig-zag face, from +z"),
+    ([Vec3::NEG_X, Vec3::Y, Vec3::NEG_Z], "looped face, from −z (turned over)"),
 ];
 
 /// Axes of the oblique view: from the lower right, 33° above the plane.
-fn oblique() -> [[f32; 3]; 3] {
+fn oblique() -> [Vec3; 3] {
     let ((sa, ca), (se, ce)) = (32.0_f32.to_radians().sin_cos(), 33.0_f32.to_radians().sin_cos());
-    let toward = [sa * ce, -ca * ce, se];
-    let right = [ca, sa, 0.0];
-    [right, scene::cross(toward, right), toward]
+    let toward = Vec3::new(sa * ce, -ca * ce, se);
+    let right = Vec3::new(ca, sa, 0.0);
+    [right, toward.cross(right), toward]
 }
 
 /// What is prescribed, and time.
@@ -112,20 +112,18 @@ fn state(mesh: &Mesh, frame: &Frame) -> String {
 
 /// Extent of everything drawn in the first image, mm.
 struct Bounds {
-    low: [f32; 3],
-    high: [f32; 3],
+    low: Vec3,
+    high: Vec3,
 }
 
 impl Bounds {
     fn of(scene: &Scene) -> Option<Self> {
-        let mut bounds = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+        let mut bounds = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
         for corner in scene.quads.iter().flat_map(|q| q.corners) {
-            for (i, value) in corner.into_iter().enumerate() {
-                bounds.low[i] = bounds.low[i].min(value);
-                bounds.high[i] = bounds.high[i].max(value);
-            }
+            // corners that are not a number do not count
+            bounds = Self { low: corner.min(bounds.low), high: corner.max(bounds.high) };
         }
-        (0..3).all(|i| (bounds.high[i] - bounds.low[i]).is_finite()).then_some(bounds)
+        (bounds.high - bounds.low).is_finite().then_some(bounds)
     }
 }
 
@@ -134,32 +132,33 @@ struct Stage {
     clip: Clip,
     middle: f32,
     thickness: f32,
-    shifts: Vec<[f32; 3]>,
+    shifts: Vec<Vec3>,
 }
 
 impl Stage {
     fn of(mesh: &Mesh, frame: &Frame, bounds: &Bounds) -> Self {
-        let middle: [f32; 3] = std::array::from_fn(|i| 0.5 * (bounds.low[i] + bounds.high[i]));
-        let thickness = bounds.high[2] - bounds.low[2];
+        let middle = 0.5 * (bounds.low + bounds.high);
+        let extent = bounds.high - bounds.low;
         let half = match mesh.period {
-            Some(period) => period.map(|l| 0.5 * CELLS * l as f32),
-            None => [0, 1].map(|i| (0.52 * (bounds.high[i] - bounds.low[i])).max(0.6 * thickness)),
+            Some(period) => 0.5 * CELLS * Vec2::from(period.map(|l| l as f32)),
+            None => (0.52 * extent.xy()).max(Vec2::splat(0.6 * extent.z)),
         };
         // A very long or narrow piece gets paper beside it instead of a very long picture.
-        let half = [half[0].max(0.4 * half[1]), half[1].max(0.3 * half[0])];
-        let clip = Clip { low: [0, 1].map(|i| middle[i] - half[i]), high: [0, 1].map(|i| middle[i] + half[i]) };
-        let reaches = |shift: &[f32; 3]| {
-            (0..2).all(|i| bounds.low[i] + shift[i] < clip.high[i] && bounds.high[i] + shift[i] > clip.low[i])
+        let half = half.max(Vec2::new(0.4, 0.3) * half.yx());
+        let clip = Clip { low: middle.xy() - half, high: middle.xy() + half };
+        let reaches = |shift: &Vec3| {
+            let [low, high] = [bounds.low, bounds.high].map(|corner| (corner + shift).xy());
+            low.cmplt(clip.high).all() && high.cmpgt(clip.low).all()
         };
-        let shifts = mesh.period.map_or(vec![[0.0; 3]], |period| {
+        let shifts = mesh.period.map_or(vec![Vec3::ZERO], |period| {
             let images = (-6..=6).flat_map(|i| (-6..=6).map(move |j| [i, j]));
-            images.map(|image| frame.shift(period, image).map(|v| v as f32)).filter(reaches).collect()
+            images.map(|image| DVec3::from(frame.shift(period, image)).as_vec3()).filter(reaches).collect()
         });
-        Self { clip, middle: middle[2], thickness, shifts }
+        Self { clip, middle: middle.z, thickness: extent.z, shifts }
     }
 
-    fn size(&self) -> [f32; 2] {
-        [0, 1].map(|i| self.clip.high[i] - self.clip.low[i])
+    fn size(&self) -> Vec2 {
+        self.clip.high - self.clip.low
     }
 }
 
@@ -177,7 +176,7 @@ impl Sheet {
     fn of(view: &View, stage: &Stage) -> Self {
         let margin = 0.0225 * view.width_px as f32;
         let width = ((view.width_px as f32 - 3.0 * margin) / 2.0) as usize;
-        let [w, h] = stage.size();
+        let Vec2 { x: w, y: h } = stage.size();
         let wide = 2 * width + margin as usize;
         Self {
             margin,
@@ -218,10 +217,10 @@ impl Sheet {
         stage: &Stage,
         [left, top]: [usize; 2],
         [width, height]: [usize; 2],
-        (axes, scale): ([[f32; 3]; 3], f32),
+        (axes, scale): ([Vec3; 3], f32),
     ) {
         let Clip { low, high } = stage.clip;
-        let centre = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), stage.middle];
+        let centre = (0.5 * (low + high)).extend(stage.middle);
         let camera = Camera { axes, centre, scale, width, height };
         image.paste(left, top, &draw(scene, &stage.shifts, &camera, &stage.clip));
     }

@@ -7,16 +7,17 @@
 
 use super::colour::{self, Rgb};
 use super::image::Image;
-use super::scene::{Kind, Quad, Scene, add, cross, dot, scale, sub, unit};
+use super::scene::{Kind, Quad, Scene};
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Where the scene is seen from.
 #[derive(Debug, Clone, Copy)]
 pub struct Camera {
     /// Unit vectors to the right, up, and toward the viewer; right-handed.
-    pub axes: [[f32; 3]; 3],
+    pub axes: [Vec3; 3],
     /// Point at the middle of the image, mm.
-    pub centre: [f32; 3],
+    pub centre: Vec3,
     /// px per mm.
     pub scale: f32,
     pub width: usize,
@@ -26,13 +27,13 @@ pub struct Camera {
 /// Part of the plane that is shown, mm.
 #[derive(Debug, Clone, Copy)]
 pub struct Clip {
-    pub low: [f32; 2],
-    pub high: [f32; 2],
+    pub low: Vec2,
+    pub high: Vec2,
 }
 
 impl Clip {
-    fn shows(&self, place: [f32; 2]) -> bool {
-        (0..2).all(|i| place[i] >= self.low[i] && place[i] <= self.high[i])
+    fn shows(&self, place: Vec2) -> bool {
+        place.cmpge(self.low).all() && place.cmple(self.high).all()
     }
 }
 
@@ -54,7 +55,7 @@ struct Fragment {
 const NOTHING: Fragment = Fragment { depth: f32::NEG_INFINITY, source: None };
 
 /// Direction of the key light, in the axes of the camera.
-const KEY: [f32; 3] = [-0.48, 0.54, 0.69];
+const KEY: Vec3 = Vec3::new(-0.48, 0.54, 0.69);
 
 /// Samples per pixel and direction.
 const FINER: usize = 2;
@@ -67,7 +68,7 @@ const BAND: usize = 64;
 const LAYERS: f32 = 100.0;
 
 /// The scene in all its periodic images, given by their displacements in mm.
-pub fn draw(scene: &Scene, shifts: &[[f32; 3]], camera: &Camera, clip: &Clip) -> Image {
+pub fn draw(scene: &Scene, shifts: &[Vec3], camera: &Camera, clip: &Clip) -> Image {
     let fine = camera.finer();
     let triangles = triangles(scene, shifts, &fine, clip);
     let mut buffer = vec![NOTHING; fine.width * fine.height];
@@ -86,7 +87,7 @@ pub fn draw(scene: &Scene, shifts: &[[f32; 3]], camera: &Camera, clip: &Clip) ->
                 std::array::from_fn(|i| [x * FINER + i % FINER, y * FINER + i / FINER]);
             let seen = samples.map(|[x, y]| buffer[y * fine.width + x]);
             let sources = seen.map(|fragment| fragment.source);
-            *pixel = [0.0; 3];
+            *pixel = Rgb::ZERO;
             for (i, source) in sources.iter().enumerate().filter(|(i, source)| !sources[..*i].contains(source)) {
                 let share = sources.iter().filter(|other| *other == source).count() as f32 / sources.len() as f32;
                 let colour = source.map_or(colour::background(), |source| {
@@ -94,7 +95,7 @@ pub fn draw(scene: &Scene, shifts: &[[f32; 3]], camera: &Camera, clip: &Clip) ->
                     let surface = Surface::at(quad, shift, source.second, &fine, samples[i]);
                     surface.lit(camera, heights.light(x, y, seen[i].depth), scene.legend.is_some())
                 });
-                *pixel = add(*pixel, scale(colour, share));
+                *pixel += colour * share;
             }
         }
     });
@@ -102,9 +103,9 @@ pub fn draw(scene: &Scene, shifts: &[[f32; 3]], camera: &Camera, clip: &Clip) ->
 }
 
 /// The triangles that reach into the picture.
-fn triangles(scene: &Scene, shifts: &[[f32; 3]], camera: &Camera, clip: &Clip) -> Vec<Triangle> {
+fn triangles(scene: &Scene, shifts: &[Vec3], camera: &Camera, clip: &Clip) -> Vec<Triangle> {
     let of_quad = |s: usize, q: usize| {
-        let corners = scene.quads[q].corners.map(|c| camera.project(add(c, shifts[s])));
+        let corners = scene.quads[q].corners.map(|c| camera.project(c + shifts[s]));
         [false, true].into_iter().filter_map(move |second| {
             let source = Source { quad: q as u32, shift: s as u16, second };
             Triangle::new(camera, clip, halves(second).map(|i| corners[i]), source)
@@ -128,18 +129,18 @@ impl Camera {
     }
 
     /// Pixel coordinates and depth of a point.
-    fn project(&self, point: [f32; 3]) -> [f32; 3] {
-        let p = sub(point, self.centre);
-        let [right, up, toward] = self.axes.map(|axis| dot(axis, p));
-        [0.5 * self.width as f32 + self.scale * right, 0.5 * self.height as f32 - self.scale * up, toward]
+    fn project(&self, point: Vec3) -> Vec3 {
+        let p = point - self.centre;
+        let [right, up, toward] = self.axes.map(|axis| axis.dot(p));
+        Vec3::new(0.5 * self.width as f32 + self.scale * right, 0.5 * self.height as f32 - self.scale * up, toward)
     }
 
     /// x and y in space of a pixel at a depth.
-    fn plane(&self, x: f32, y: f32, depth: f32) -> [f32; 2] {
+    fn plane(&self, x: f32, y: f32, depth: f32) -> Vec2 {
         let right = (x - 0.5 * self.width as f32) / self.scale;
         let up = (0.5 * self.height as f32 - y) / self.scale;
         let [r, u, t] = self.axes;
-        [0, 1].map(|i| self.centre[i] + right * r[i] + up * u[i] + depth * t[i])
+        (self.centre + right * r + up * u + depth * t).truncate()
     }
 }
 
@@ -166,15 +167,15 @@ struct Triangle {
 
 impl Triangle {
     /// `None` where it has no area or is out of sight.
-    fn new(camera: &Camera, clip: &Clip, corners: [[f32; 3]; 3], source: Source) -> Option<Self> {
+    fn new(camera: &Camera, clip: &Clip, corners: [Vec3; 3], source: Source) -> Option<Self> {
         let reach = |k: usize, size: usize| {
             let (low, high) = corners.iter().fold((f32::MAX, f32::MIN), |(l, h), c| (l.min(c[k]), h.max(c[k])));
             (high > 0.0 && low < size as f32).then(|| [low.max(0.0) as usize, (high as usize + 1).min(size)])
         };
         let (columns, rows) = (reach(0, camera.width)?, reach(1, camera.height)?);
         let weights = weights(corners)?;
-        let depth = std::array::from_fn(|i| (0..3).map(|k| weights[k][i] * corners[k][2]).sum());
-        let cut = corners.iter().any(|c| !clip.shows(camera.plane(c[0], c[1], c[2])));
+        let depth = std::array::from_fn(|i| (0..3).map(|k| weights[k][i] * corners[k].z).sum());
+        let cut = corners.iter().any(|c| !clip.shows(camera.plane(c.x, c.y, c.z)));
         Some(Self { source, weights, depth, columns, rows, cut })
     }
 
@@ -216,56 +217,57 @@ impl Triangle {
 }
 
 /// Weights of the corners of a screen triangle; `None` where it has no area.
-fn weights([a, b, c]: [[f32; 3]; 3]) -> Option<[Plane; 3]> {
-    let whole = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-    let edge = |p: [f32; 3], q: [f32; 3]| {
-        let (dx, dy) = ((p[1] - q[1]) / whole, (q[0] - p[0]) / whole);
-        [dx, dy, -(dx * p[0] + dy * p[1])]
+fn weights(corners: [Vec3; 3]) -> Option<[Plane; 3]> {
+    let [a, b, c] = corners.map(Vec3::truncate);
+    let whole = (b - a).perp_dot(c - a);
+    let edge = |p: Vec2, q: Vec2| {
+        let (dx, dy) = ((p.y - q.y) / whole, (q.x - p.x) / whole);
+        [dx, dy, -(dx * p.x + dy * p.y)]
     };
     (whole.abs() > 1e-9).then(|| [edge(b, c), edge(c, a), edge(a, b)])
 }
 
 /// A visible point of a surface.
 struct Surface {
-    normal: [f32; 3],
-    fibre: [f32; 3],
+    normal: Vec3,
+    fibre: Vec3,
     colour: Rgb,
-    grain: [f32; 3],
+    grain: Vec3,
     kind: Kind,
     /// Seen from inside: part of a cut face.
     cut: bool,
 }
 
 impl Surface {
-    fn at(quad: &Quad, shift: [f32; 3], second: bool, camera: &Camera, [x, y]: [usize; 2]) -> Self {
+    fn at(quad: &Quad, shift: Vec3, second: bool, camera: &Camera, [x, y]: [usize; 2]) -> Self {
         let corners = halves(second);
-        let screen = corners.map(|i| camera.project(add(quad.corners[i], shift)));
+        let screen = corners.map(|i| camera.project(quad.corners[i] + shift));
         let at = |[dx, dy, at]: Plane| dx * (x as f32 + 0.5) + dy * (y as f32 + 0.5) + at;
         let w = weights(screen).map_or([1.0, 0.0, 0.0], |weights| weights.map(at));
-        let blend = |values: &[[f32; 3]; 4]| {
-            let part = |k: usize| scale(values[corners[k]], w[k]);
-            add(add(part(0), part(1)), part(2))
+        let blend = |values: &[Vec3; 4]| {
+            let part = |k: usize| values[corners[k]] * w[k];
+            part(0) + part(1) + part(2)
         };
-        let normal = unit(blend(&quad.normals));
+        let normal = blend(&quad.normals).normalize_or_zero();
         let [a, b, c] = corners.map(|i| quad.corners[i]);
-        let flat = cross(sub(b, a), sub(c, a));
-        let outward = if dot(flat, normal) < 0.0 { scale(flat, -1.0) } else { flat };
+        let flat = (b - a).cross(c - a);
+        let outward = if flat.dot(normal) < 0.0 { -flat } else { flat };
         Self {
             normal,
-            fibre: unit(sub(quad.corners[1], quad.corners[0])),
+            fibre: (quad.corners[1] - quad.corners[0]).normalize_or_zero(),
             colour: blend(&quad.colours),
             grain: blend(&quad.grain),
             kind: quad.kind,
-            cut: dot(outward, camera.axes[2]) < 0.0,
+            cut: outward.dot(camera.axes[2]) < 0.0,
         }
     }
 
     /// Colour under the lights: `sky` and `sun` are the shares of them that arrive; `calm` subdues patterns.
     fn lit(&self, camera: &Camera, [sky, sun]: [f32; 2], calm: bool) -> Rgb {
         let [right, up, toward] = camera.axes;
-        let key = unit(add(add(scale(right, KEY[0]), scale(up, KEY[1])), scale(toward, KEY[2])));
+        let key = (right * KEY.x + up * KEY.y + toward * KEY.z).normalize_or_zero();
         if self.cut {
-            return scale(self.colour, 0.55 + 0.2 * sky);
+            return self.colour * (0.55 + 0.2 * sky);
         }
         let (texture, gloss, power, normal) = match self.kind {
             Kind::Yarn => (filaments(self.grain), 0.16, 24, relief(self.normal, toward)),
@@ -273,25 +275,26 @@ impl Surface {
         };
         // Where colours are values, the pattern of the filaments stays in the background.
         let (texture, gloss) = if calm { (1.0 + 0.3 * (texture - 1.0), 0.2 * gloss) } else { (texture, gloss) };
-        let half = unit(add(key, toward));
-        let along = dot(self.fibre, half);
-        let sheen = gloss * (1.0 - along * along).max(0.0).powi(power) * dot(normal, half).max(0.0).powi(6);
-        let dome = 0.5 + 0.5 * dot(normal, toward);
-        let light = texture * (0.60 * sky * dome + 0.97 * sun * dot(normal, key).max(0.0));
+        let half = (key + toward).normalize_or_zero();
+        let along = self.fibre.dot(half);
+        let sheen = gloss * (1.0 - along * along).max(0.0).powi(power) * normal.dot(half).max(0.0).powi(6);
+        let dome = 0.5 + 0.5 * normal.dot(toward);
+        let light = texture * (0.60 * sky * dome + 0.97 * sun * normal.dot(key).max(0.0));
         let shine = sheen * sun * texture * texture;
-        self.colour.map(|c| c * light + shine * (0.25 + 0.75 * c))
+        self.colour * light + shine * (0.25 + 0.75 * self.colour)
     }
 }
 
 /// A normal whose tilt away from the viewer is exaggerated, as on relief maps: yarns are ten times wider than thick.
-fn relief(normal: [f32; 3], toward: [f32; 3]) -> [f32; 3] {
+fn relief(normal: Vec3, toward: Vec3) -> Vec3 {
     const TILT: f32 = 1.9;
-    unit(add(scale(normal, TILT), scale(toward, (1.0 - TILT) * dot(normal, toward))))
+    (normal * TILT + toward * ((1.0 - TILT) * normal.dot(toward))).normalize_or_zero()
 }
 
 /// Brightness of the filaments of a tow: fine streaks along the fibre, at several widths. It repeats with the length, so
 /// that no seam shows where a yarn closes on itself.
-fn filaments([across, along, length]: [f32; 3]) -> f32 {
+fn filaments(grain: Vec3) -> f32 {
+    let [across, along, length] = grain.to_array();
     let streaks = |per_mm: f32, long: f32| {
         let cells = (length / long).round().max(1.0);
         noise(across * per_mm, along * cells, cells as i32) - 0.5
@@ -300,7 +303,8 @@ fn filaments([across, along, length]: [f32; 3]) -> f32 {
 }
 
 /// Brightness of a twisted thread: two plies winding around it.
-fn twist([around, along, turns]: [f32; 3]) -> f32 {
+fn twist(grain: Vec3) -> f32 {
+    let [around, along, turns] = grain.to_array();
     0.92 + 0.13 * (std::f32::consts::TAU * (2.0 * around + along * turns)).sin()
 }
 
@@ -370,11 +374,11 @@ impl Heights {
                 RINGS.map(|ring| (ring, place([ring * angle.cos(), ring * angle.sin()])))
             })
         });
-        let flat = KEY[0].hypot(KEY[1]);
+        let flat = KEY.x.hypot(KEY.y);
         let towards = std::array::from_fn(|turn| {
             std::array::from_fn(|k| {
                 let run = LENGTH * (k as f32 + 0.3 + 0.7 * turn as f32 / TURNS as f32) / STEPS as f32;
-                (run * KEY[2] / flat, place([KEY[0] / flat * run, -KEY[1] / flat * run]))
+                (run * KEY.z / flat, place([KEY.x / flat * run, -KEY.y / flat * run]))
             })
         });
         Self { values, width, margin, around, towards }
@@ -405,22 +409,22 @@ mod tests {
 
     fn square(z: f32, colour: Rgb) -> Quad {
         Quad {
-            corners: [[0.0, 0.0, z], [4.0, 0.0, z], [4.0, 4.0, z], [0.0, 4.0, z]],
-            normals: [[0.0, 0.0, 1.0]; 4],
+            corners: [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]].map(|[x, y]| Vec3::new(x, y, z)),
+            normals: [Vec3::Z; 4],
             colours: [colour; 4],
-            grain: [[0.0, 0.0, 1.0]; 4],
+            grain: [Vec3::Z; 4],
             kind: Kind::Yarn,
         }
     }
 
     #[test]
     fn the_nearer_surface_hides_the_other_and_the_clip_cuts() {
-        let scene = Scene { quads: vec![square(1.0, [0.0, 0.0, 1.0]), square(0.0, [1.0, 0.0, 0.0])], legend: None };
-        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let camera = Camera { axes, centre: [2.0, 2.0, 0.0], scale: 10.0, width: 60, height: 60 };
-        let clip = Clip { low: [0.0, 0.0], high: [2.0, 4.0] };
-        let image = draw(&scene, &[[0.0; 3]], &camera, &clip);
-        let [red, _, blue] = image.pixel(20, 30);
+        let scene = Scene { quads: vec![square(1.0, Rgb::Z), square(0.0, Rgb::X)], legend: None };
+        let axes = Vec3::AXES;
+        let camera = Camera { axes, centre: Vec3::new(2.0, 2.0, 0.0), scale: 10.0, width: 60, height: 60 };
+        let clip = Clip { low: Vec2::ZERO, high: Vec2::new(2.0, 4.0) };
+        let image = draw(&scene, &[Vec3::ZERO], &camera, &clip);
+        let [red, _, blue] = image.pixel(20, 30).to_array();
         assert!(blue > 0.3 && red < 0.2, "{red} {blue}");
         assert_eq!(image.pixel(40, 30), colour::background());
         assert_eq!(image.pixel(2, 2), colour::background());
@@ -428,11 +432,11 @@ mod tests {
 
     #[test]
     fn inner_sides_are_cut_faces() {
-        let mut quad = square(0.0, [1.0; 3]);
-        quad.normals = [[0.0, 0.0, -1.0]; 4];
-        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let camera = Camera { axes, centre: [2.0, 2.0, 0.0], scale: 10.0, width: 20, height: 20 };
-        let surface = Surface::at(&quad, [0.0; 3], false, &camera, [12, 12]);
+        let mut quad = square(0.0, Rgb::ONE);
+        quad.normals = [Vec3::NEG_Z; 4];
+        let axes = Vec3::AXES;
+        let camera = Camera { axes, centre: Vec3::new(2.0, 2.0, 0.0), scale: 10.0, width: 20, height: 20 };
+        let surface = Surface::at(&quad, Vec3::ZERO, false, &camera, [12, 12]);
         assert!(surface.cut);
     }
 }

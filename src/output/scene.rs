@@ -6,7 +6,8 @@
 use super::colour::{self, Rgb};
 use crate::error::{Error, Result};
 use crate::mesh::frame::{Field, Frame};
-use crate::mesh::{Block, Mesh, Ply, Thread};
+use crate::mesh::{Block, Mesh, Ply, Seen, Thread};
+use glam::{DVec3, Vec3};
 
 /// Sides of a tube, and pieces per beam.
 const SIDES: usize = 14;
@@ -27,13 +28,13 @@ pub struct Scene {
 #[derive(Debug, Clone, Copy)]
 pub struct Quad {
     /// mm.
-    pub corners: [[f32; 3]; 4],
+    pub corners: [Vec3; 4],
     /// Outward, unit length.
-    pub normals: [[f32; 3]; 4],
+    pub normals: [Vec3; 4],
     pub colours: [Rgb; 4],
     /// Coordinates of the filament pattern at each corner: across the fibre (yarns: mm, threads: turns), along it (share of
     /// the length), and the length (yarns: mm, threads: whole turns of the twist).
-    pub grain: [[f32; 3]; 4],
+    pub grain: [Vec3; 4],
     pub kind: Kind,
 }
 
@@ -139,8 +140,8 @@ fn surfaces(
 ) {
     let (slices, columns, layers) = (block.slices, block.columns, block.layers);
     // A face is a grid: (i, j) on it to (slice, column, layer); `flip` where i × j points inward.
-    type Place = fn(usize, usize, usize) -> [usize; 3];
-    let mut faces: Vec<(usize, usize, usize, bool, Place)> = vec![
+    type Corner = fn(usize, usize, usize) -> [usize; 3];
+    let mut faces: Vec<(usize, usize, usize, bool, Corner)> = vec![
         (slices, columns, 0, true, |i, j, at| [i, j, at]),
         (slices, columns, layers, false, |i, j, at| [i, j, at]),
         (slices, layers, 0, false, |i, j, at| [i, at, j]),
@@ -150,31 +151,31 @@ fn surfaces(
         faces.push((columns, layers, 0, true, |i, j, at| [at, i, j]));
         faces.push((columns, layers, slices, false, |i, j, at| [at, i, j]));
     }
-    let position = |[s, c, l]: [usize; 3]| frame.position(mesh, block.node(s, c, l)).map(|v| v as f32);
+    let position = |[s, c, l]: [usize; 3]| place(mesh, frame, block.node(s, c, l));
     let base = match block.ply {
         Ply::Warp => colour::warp(),
         Ply::Weft => colour::weft(),
         Ply::Free => colour::free(),
     };
-    for (face, &(rows, across, at, flip, place)) in faces.iter().enumerate() {
-        let point = |i: usize, j: usize| position(place(i, j, at));
+    for (face, &(rows, across, at, flip, corner)) in faces.iter().enumerate() {
+        let point = |i: usize, j: usize| position(corner(i, j, at));
         // Normals from neighbours on the grid; a closed yarn continues beyond its ends.
         let closed = block.wrap.is_some();
         let along = |i: usize, j: usize| match (closed, i == 0 || i == rows) {
-            (true, true) => add(sub(point(1, j), point(0, j)), sub(point(rows, j), point(rows - 1, j))),
-            _ => sub(point((i + 1).min(rows), j), point(i.saturating_sub(1), j)),
+            (true, true) => point(1, j) - point(0, j) + (point(rows, j) - point(rows - 1, j)),
+            _ => point((i + 1).min(rows), j) - point(i.saturating_sub(1), j),
         };
-        let over = |i: usize, j: usize| sub(point(i, (j + 1).min(across)), point(i, j.saturating_sub(1)));
+        let over = |i: usize, j: usize| point(i, (j + 1).min(across)) - point(i, j.saturating_sub(1));
         let normal = |i: usize, j: usize| {
-            let n = unit(cross(along(i, j), over(i, j)));
-            if flip { n.map(|v| -v) } else { n }
+            let n = along(i, j).cross(over(i, j)).normalize_or_zero();
+            if flip { -n } else { n }
         };
         let offset = 17.3 * (index * 8 + face) as f32;
-        let width = norm(sub(position([0, columns, 0]), position([0, 0, 0])));
-        let length = norm(sub(position([slices, 0, 0]), position([0, 0, 0])));
+        let width = position([0, columns, 0]).distance(position([0, 0, 0]));
+        let length = position([slices, 0, 0]).distance(position([0, 0, 0]));
         let grain = |i: usize, j: usize| {
-            let [s, c, l] = place(i, j, at).map(|v| v as f32);
-            [offset + c / columns as f32 * width + 0.2 * l, s / slices as f32, length]
+            let [s, c, l] = corner(i, j, at).map(|v| v as f32);
+            Vec3::new(offset + c / columns as f32 * width + 0.2 * l, s / slices as f32, length)
         };
         for i in 0..rows {
             for j in 0..across {
@@ -182,11 +183,11 @@ fn surfaces(
                 let colours = ends.map(|[a, b]| {
                     let Some(paint) = paint else { return base };
                     if let Some(field) = paint.hex {
-                        let [s, c, l] = place(i, j, at);
+                        let [s, c, l] = corner(i, j, at);
                         let (s, c, l) = (s.min(slices - 1), c.min(columns - 1), l.min(layers - 1));
                         return paint.colour(paint.value(field, first + (l * columns + c) * slices + s));
                     }
-                    let [s, c, l] = place(a, b, at);
+                    let [s, c, l] = corner(a, b, at);
                     paint.node.map_or(colour::plain(), |f| paint.colour(paint.value(f, block.node(s, c, l).node)))
                 });
                 quads.push(Quad {
@@ -207,37 +208,36 @@ fn tube(quads: &mut Vec<Quad>, mesh: &Mesh, frame: &Frame, thread: &Thread, firs
     if beams == 0 {
         return;
     }
-    let mut points: Vec<[f32; 3]> =
-        (0..beams).map(|i| frame.position(mesh, thread.beam(i)[0]).map(|v| v as f32)).collect();
-    points.push(frame.position(mesh, thread.beam(beams - 1)[1]).map(|v| v as f32));
-    let turn = sub(points[beams], points[0]);
+    let mut points: Vec<Vec3> = (0..beams).map(|i| place(mesh, frame, thread.beam(i)[0])).collect();
+    points.push(place(mesh, frame, thread.beam(beams - 1)[1]));
+    let turn = points[beams] - points[0];
     let closed = thread.wrap.is_some();
-    let before = if closed { sub(points[beams - 1], turn) } else { points[0] };
-    let after = if closed { add(points[1], turn) } else { points[beams] };
+    let before = if closed { points[beams - 1] - turn } else { points[0] };
+    let after = if closed { points[1] + turn } else { points[beams] };
     let at = |i: usize| match i {
         0 => before,
         i if i <= beams + 1 => points[i - 1],
         _ => after,
     };
     // Points and directions of the smooth curve, PIECES a beam.
-    let curve: Vec<([f32; 3], [f32; 3])> = (0..=beams * PIECES)
+    let curve: Vec<(Vec3, Vec3)> = (0..=beams * PIECES)
         .map(|k| {
             let beam = (k / PIECES).min(beams - 1);
             let t = (k - beam * PIECES) as f32 / PIECES as f32;
             catmull_rom([at(beam), at(beam + 1), at(beam + 2), at(beam + 3)], t)
         })
         .collect();
-    let mut side = unit(perpendicular(curve[0].1));
+    let mut side = perpendicular(curve[0].1).normalize_or_zero();
     let mut run = 0.0;
-    let mut rings: Vec<([[f32; 3]; SIDES], f32)> = Vec::with_capacity(curve.len());
+    let mut rings: Vec<([Vec3; SIDES], f32)> = Vec::with_capacity(curve.len());
     for (k, &(point, direction)) in curve.iter().enumerate() {
         // Carried along without twisting.
-        side = unit(sub(side, scale(direction, dot(side, direction))));
-        let up = cross(direction, side);
-        run += if k == 0 { 0.0 } else { norm(sub(point, curve[k - 1].0)) };
+        side = (side - direction * side.dot(direction)).normalize_or_zero();
+        let up = direction.cross(side);
+        run += if k == 0 { 0.0 } else { point.distance(curve[k - 1].0) };
         let radial = |n: usize| {
             let (s, c) = (std::f32::consts::TAU * n as f32 / SIDES as f32).sin_cos();
-            add(scale(side, c), scale(up, s))
+            side * c + up * s
         };
         rings.push((std::array::from_fn(radial), run));
     }
@@ -257,10 +257,11 @@ fn tube(quads: &mut Vec<Quad>, mesh: &Mesh, frame: &Frame, thread: &Thread, firs
             let ends = [[0, n], [1, n], [1, n + 1], [0, n + 1]];
             let radial = |[end, n]: [usize; 2]| rings[k + end].0[n % SIDES];
             quads.push(Quad {
-                corners: ends.map(|e| add(curve[k + e[0]].0, scale(radial(e), radius))),
+                corners: ends.map(|e| curve[k + e[0]].0 + radial(e) * radius),
                 normals: ends.map(radial),
                 colours: ends.map(|e| colour(e[0])),
-                grain: ends.map(|[end, n]| [n as f32 / SIDES as f32, rings[k + end].1 / run, (run / TWIST).round()]),
+                grain: ends
+                    .map(|[end, n]| Vec3::new(n as f32 / SIDES as f32, rings[k + end].1 / run, (run / TWIST).round())),
                 kind: Kind::Thread,
             });
         }
@@ -268,53 +269,22 @@ fn tube(quads: &mut Vec<Quad>, mesh: &Mesh, frame: &Frame, thread: &Thread, firs
 }
 
 /// Point and unit direction on the curve from `p[1]` (t = 0) to `p[2]` (t = 1).
-fn catmull_rom(p: [[f32; 3]; 4], t: f32) -> ([f32; 3], [f32; 3]) {
-    let coefficients = |i: usize| {
-        let [a, b, c, d] = p.map(|v| v[i]);
-        [b, 0.5 * (c - a), a - 2.5 * b + 2.0 * c - 0.5 * d, 0.5 * (d - a) + 1.5 * (b - c)]
-    };
-    let point = std::array::from_fn(|i| {
-        let [a, b, c, d] = coefficients(i);
-        a + t * (b + t * (c + t * d))
-    });
-    let direction = std::array::from_fn(|i| {
-        let [_, b, c, d] = coefficients(i);
-        b + t * (2.0 * c + t * 3.0 * d)
-    });
-    (point, unit(direction))
+fn catmull_rom([before, from, to, after]: [Vec3; 4], t: f32) -> (Vec3, Vec3) {
+    let slope = 0.5 * (to - before);
+    let square = before - 2.5 * from + 2.0 * to - 0.5 * after;
+    let cube = 0.5 * (after - before) + 1.5 * (from - to);
+    let direction = slope + t * (2.0 * square + t * 3.0 * cube);
+    (from + t * (slope + t * (square + t * cube)), direction.normalize_or_zero())
 }
 
-fn perpendicular(v: [f32; 3]) -> [f32; 3] {
-    cross(v, if v[2].abs() < 0.7 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] })
+/// A vector across `v`, not of unit length.
+fn perpendicular(v: Vec3) -> Vec3 {
+    v.cross(if v.z.abs() < 0.7 { Vec3::Z } else { Vec3::X })
 }
 
-pub(super) fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    std::array::from_fn(|i| a[i] + b[i])
-}
-
-pub(super) fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-pub(super) fn scale(a: [f32; 3], s: f32) -> [f32; 3] {
-    a.map(|v| v * s)
-}
-
-pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(super) fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn norm(a: [f32; 3]) -> f32 {
-    dot(a, a).sqrt()
-}
-
-/// Unit vector; a zero vector stays zero.
-pub(super) fn unit(a: [f32; 3]) -> [f32; 3] {
-    scale(a, 1.0 / norm(a).max(1e-30))
+/// Where a node is seen, mm.
+fn place(mesh: &Mesh, frame: &Frame, seen: Seen) -> Vec3 {
+    DVec3::from(frame.position(mesh, seen)).as_vec3()
 }
 
 #[cfg(test)]
@@ -332,14 +302,14 @@ mod tests {
         assert_eq!(scene.quads.len(), wanted);
         for quad in &scene.quads {
             let [a, b, c, d] = quad.corners;
-            let across = cross(sub(c, a), sub(d, b));
-            let outward = dot(across, quad.normals[0]);
-            assert!((0..4).all(|i| (norm(quad.normals[i]) - 1.0).abs() < 1e-5));
-            assert!(outward.abs() > 0.5 * norm(across), "normal along its face");
+            let across = (c - a).cross(d - b);
+            let outward = across.dot(quad.normals[0]);
+            assert!((0..4).all(|i| (quad.normals[i].length() - 1.0).abs() < 1e-5));
+            assert!(outward.abs() > 0.5 * across.length(), "normal along its face");
         }
         // Top faces of warps look up, bottom faces down.
-        for quad in scene.quads.iter().filter(|q| q.kind == Kind::Yarn && q.corners.iter().all(|c| c[2] > 0.35)) {
-            assert!(quad.normals.iter().all(|n| n[2] > 0.9));
+        for quad in scene.quads.iter().filter(|q| q.kind == Kind::Yarn && q.corners.iter().all(|c| c.z > 0.35)) {
+            assert!(quad.normals.iter().all(|n| n.z > 0.9));
         }
     }
 

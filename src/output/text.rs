@@ -99,8 +99,8 @@ mod tests {
 
     #[test]
     fn letters_put_ink_where_they_stand() {
-        let mut image = Image::new(60, 30, [1.0; 3]);
-        draw(&mut image, 10.0, 2.0, 20.0, "I", [0.0; 3]);
+        let mut image = Image::new(60, 30, Rgb::ONE);
+        draw(&mut image, 10.0, 2.0, 20.0, "I", Rgb::ZERO);
         let ink: f32 =
             (0..60).flat_map(|x| (0..30).map(move |y| (x, y))).map(|(x, y)| 1.0 - image.pixel(x, y)[0]).sum();
         assert!(ink > 20.0 && ink < 60.0, "{ink}");

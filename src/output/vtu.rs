@@ -23,6 +23,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
+use glam::{DMat3, DVec3};
 use std::collections::HashMap;
 use std::io::{self, Write};
 use std::path::Path;
@@ -198,7 +199,7 @@ fn bodies(mesh: &Mesh, frame: &Frame) -> Vec<Array> {
             part.push(-1);
             thread_of.push(-1);
             radius.push(0.0);
-            fibre.extend(carried(mesh, frame, &corners, block.fibre));
+            fibre.extend(carried(mesh, frame, &corners, block.fibre.into()).to_array());
         }
     }
     for (index, thread) in mesh.threads.iter().enumerate() {
@@ -212,8 +213,8 @@ fn bodies(mesh: &Mesh, frame: &Frame) -> Vec<Array> {
             });
             thread_of.push(index as i32);
             radius.push(thread.radius);
-            let [a, b] = thread.beam(i).map(|seen| frame.position(mesh, seen));
-            fibre.extend(unit(std::array::from_fn(|k| b[k] - a[k])));
+            let [a, b] = thread.beam(i).map(|seen| DVec3::from(frame.position(mesh, seen)));
+            fibre.extend(unit(b - a).to_array());
         }
     }
     vec![
@@ -242,37 +243,28 @@ fn joined(mesh: &Mesh, frame: &Frame) -> Vec<Field> {
 }
 
 /// A reference direction carried along by the deformation at the centre of a hexahedron, unit length.
-fn carried(mesh: &Mesh, frame: &Frame, corners: &[Seen; 8], direction: [f64; 3]) -> [f64; 3] {
-    let before = axes(&corners.map(|seen| mesh.position(seen)));
-    let after = axes(&corners.map(|seen| frame.position(mesh, seen)));
-    // Shares of the direction in the reference axes, by Cramer's rule.
-    let det = |[a, b, c]: [[f64; 3]; 3]| dot(a, cross(b, c));
-    let whole = det(before);
-    let share = |k: usize| {
-        let mut columns = before;
-        columns[k] = direction;
-        det(columns) / whole
-    };
-    let shares = [share(0), share(1), share(2)];
-    unit(std::array::from_fn(|i| (0..3).map(|k| shares[k] * after[k][i]).sum()))
+fn carried(mesh: &Mesh, frame: &Frame, corners: &[Seen; 8], direction: DVec3) -> DVec3 {
+    let before = axes(corners.map(|seen| mesh.position(seen)));
+    let after = axes(corners.map(|seen| frame.position(mesh, seen)));
+    // shares of the direction in the reference axes, by Cramer's rule
+    let det = |a: DVec3, b: DVec3, c: DVec3| a.dot(b.cross(c));
+    let DMat3 { x_axis: a, y_axis: b, z_axis: c } = before;
+    let shares = DVec3::new(det(direction, b, c), det(a, direction, c), det(a, b, direction)) / det(a, b, c);
+    unit(after * shares)
 }
 
-/// Vectors along ξ, η and ζ at the centre of a hexahedron, up to a common factor.
-fn axes(p: &[[f64; 3]; 8]) -> [[f64; 3]; 3] {
+/// Vectors along ξ, η and ζ at the centre of a hexahedron, as columns, up to a common factor.
+fn axes(corners: [[f64; 3]; 8]) -> DMat3 {
     const PLUS: [[usize; 4]; 3] = [[1, 2, 5, 6], [2, 3, 6, 7], [4, 5, 6, 7]];
-    PLUS.map(|plus| std::array::from_fn(|i| (0..8).map(|n| if plus.contains(&n) { p[n][i] } else { -p[n][i] }).sum()))
+    let corners = corners.map(DVec3::from);
+    let along = |plus: [usize; 4]| (0..8).map(|n| if plus.contains(&n) { corners[n] } else { -corners[n] }).sum();
+    let [xi, eta, zeta] = PLUS.map(along);
+    DMat3::from_cols(xi, eta, zeta)
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn unit(v: [f64; 3]) -> [f64; 3] {
-    v.map(|c| c / dot(v, v).sqrt())
+/// Not a number where a vector has no length.
+fn unit(v: DVec3) -> DVec3 {
+    v / v.length()
 }
 
 /// One inline array: a header of the sizes of its blocks, then the blocks, each part in base64.
@@ -350,9 +342,9 @@ mod tests {
 
     /// Volume of a hexahedron as six tetrahedra around the diagonal 0 – 6.
     fn volume(p: &[[f64; 3]]) -> f64 {
-        let edge = |i: usize| std::array::from_fn(|k| p[i][k] - p[0][k]);
+        let edge = |i: usize| DVec3::from(p[i]) - DVec3::from(p[0]);
         let ring = [1, 2, 3, 7, 4, 5, 1];
-        ring.windows(2).map(|w| dot(edge(w[0]), cross(edge(w[1]), edge(6))) / 6.0).sum()
+        ring.windows(2).map(|w| edge(w[0]).dot(edge(w[1]).cross(edge(6))) / 6.0).sum()
     }
 
     #[test]

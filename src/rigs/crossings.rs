@@ -8,11 +8,14 @@ use crate::measure::crossings::{Crossing, Crossings, angles, slips};
 use crate::measure::yarns::{self, Yarn};
 use crate::mesh::Mesh;
 use crate::mesh::frame::{Field, Frame};
+use crate::output::appended::Appended;
 use crate::output::chart;
 use crate::output::page::Page;
 use crate::output::results::{Results, short};
-use crate::output::table::{CROSSINGS, Cell, SHEAR, Table, ZONES};
+use crate::output::rows;
+use crate::output::table::{Table, text};
 use crate::output::{map, vtu};
+use glam::{DVec2, DVec3, Vec3Swizzles};
 use std::path::Path;
 
 /// Means over a zone leave out what is closer to its border than this share of the width of the specimen.
@@ -23,12 +26,17 @@ const OUTER: f64 = 0.02;
 /// The crossings of a scene with their files.
 pub(super) struct Crossed {
     crossings: Crossings,
-    /// Of a specimen.
-    zones: Option<Zones>,
-    /// `shear.csv` and `crossings.csv`.
-    pub(super) tables: [Table; 2],
+    shear: Shear,
+    /// `crossings.csv`.
+    each: Table<rows::Crossing>,
     /// Times, s, and maps.
     pub(super) maps: Vec<(f64, String)>,
+}
+
+/// `shear.csv`: that of a specimen has zones.
+enum Shear {
+    Whole(Table<rows::Shear>),
+    Zoned(Zones, Table<(rows::Shear, rows::Zones)>),
 }
 
 /// Zone of each crossing: of every one, and of those well inside.
@@ -39,7 +47,7 @@ struct Zones {
 
 impl Zones {
     fn of(strip: &Strip, mesh: &Mesh, crossings: &Crossings) -> Self {
-        let yarns = |warp: usize, weft: usize| [warp, weft].map(|b| [mesh.blocks[b].fibre[0], mesh.blocks[b].fibre[1]]);
+        let yarns = |warp: usize, weft: usize| [warp, weft].map(|b| DVec3::from(mesh.blocks[b].fibre).xy());
         let places = || crossings.pairs.iter().map(|p| (p.reference, yarns(p.warp, p.weft)));
         let margin = MARGIN * strip.width;
         Self {
@@ -52,15 +60,33 @@ impl Zones {
 impl Crossed {
     /// Opens the tables of a scene; `None` if it has no crossings. Positive shear turns yarns towards `diagonal`; the strip between
     /// the clamps of a specimen has zones.
-    pub(super) fn of(mesh: &Mesh, diagonal: [f64; 2], strip: Option<Strip>, tables: &Tables) -> Result<Option<Self>> {
+    pub(super) fn of(mesh: &Mesh, diagonal: DVec2, strip: Option<Strip>, tables: &Tables) -> Result<Option<Self>> {
         let crossings = Crossings::of(mesh, diagonal);
         if crossings.pairs.is_empty() {
             return Ok(None);
         }
-        let zones = strip.map(|strip| Zones::of(&strip, mesh, &crossings));
-        let shear = [SHEAR, if zones.is_some() { ZONES } else { &[] }].concat();
-        let tables = [tables.open("shear.csv", &shear)?, tables.open("crossings.csv", CROSSINGS)?];
-        Ok(Some(Self { crossings, zones, tables, maps: Vec::new() }))
+        let shear = match strip {
+            Some(strip) => Shear::Zoned(Zones::of(&strip, mesh, &crossings), tables.open("shear.csv")?),
+            None => Shear::Whole(tables.open("shear.csv")?),
+        };
+        Ok(Some(Self { crossings, shear, each: tables.open("crossings.csv")?, maps: Vec::new() }))
+    }
+
+    /// Files of the tables.
+    pub(super) fn files(&mut self) -> [&mut Appended; 2] {
+        let shear = match &mut self.shear {
+            Shear::Whole(table) => &mut table.file,
+            Shear::Zoned(_, table) => &mut table.file,
+        };
+        [shear, &mut self.each.file]
+    }
+
+    /// Those of a specimen.
+    fn zones(&self) -> Option<&Zones> {
+        match &self.shear {
+            Shear::Whole(_) => None,
+            Shear::Zoned(zones, _) => Some(zones),
+        }
     }
 
     pub(super) fn measure(&self, mesh: &Mesh, frame: &Frame, yarns: &[Yarn]) -> Result<Vec<Crossing>> {
@@ -69,22 +95,28 @@ impl Crossed {
 
     /// Means over the zones of a specimen.
     pub(super) fn means(&self, crossings: &[Crossing]) -> Option<Means> {
-        self.zones.as_ref().map(|zones| Means::of(crossings, &zones.core))
+        self.zones().map(|zones| Means::of(crossings, &zones.core))
     }
 
     /// Means over all crossings, and over those of each zone; `state` is time, shear angle in degrees, and displacement,
     /// `theory` the angle of zone C without slip, rad.
     pub(super) fn write_row(&mut self, state: [f64; 3], crossings: &[Crossing], theory: f64) -> Result<()> {
         let (angle, slip) = (angles(crossings.iter()), slips(crossings.iter()));
-        let degrees = [angle.mean, angle.std, angle.min, angle.max].map(f64::to_degrees);
-        let mut numbers = [&state[..], &degrees, &[slip.mean, slip.max]].concat();
-        if let Some(m) = self.means(crossings) {
-            numbers.push(theory.to_degrees());
-            numbers.extend([m.angle, m.angle_std].concat().into_iter().map(f64::to_degrees));
-            numbers.extend([&m.slip[..], &m.width, &m.gap, &m.broadness].concat());
-            numbers.extend(m.direction.map(f64::to_degrees));
+        let row = rows::Shear {
+            time_s: state[0],
+            shear_angle_deg: state[1],
+            displacement_mm: state[2],
+            effective_angle_mean_deg: angle.mean.to_degrees(),
+            effective_angle_std_deg: angle.std.to_degrees(),
+            effective_angle_min_deg: angle.min.to_degrees(),
+            effective_angle_max_deg: angle.max.to_degrees(),
+            slip_mean_mm: slip.mean,
+            slip_max_mm: slip.max,
+        };
+        match &mut self.shear {
+            Shear::Whole(table) => table.row(&row),
+            Shear::Zoned(zones, table) => table.row(&(row, by_zone(&Means::of(crossings, &zones.core), theory))),
         }
-        self.tables[0].numbers(&numbers)
     }
 
     /// Every crossing of a frame: fields of hexahedra that follow from them, rows of the table, and a map in the folder of results.
@@ -111,17 +143,33 @@ impl Crossed {
     ) -> Result<()> {
         let angle = self.means(crossings).map_or(frame.angle_deg, |means| means.angle[2].to_degrees());
         for (i, (pair, c)) in self.crossings.pairs.iter().zip(crossings).enumerate() {
-            let head = [frame.time, angle, frame.displacement_mm].map(Cell::from);
-            let zone = self.zones.as_ref().map_or("none", |zones| zones.all[i].name());
-            let names = [pair.warp, pair.weft].map(|block| mesh.blocks[block].name.as_str().into());
-            let degrees = [c.angle, c.direction[0], c.direction[1]].map(f64::to_degrees);
-            let numbers = [&pair.reference[..], &c.position, &degrees, &c.slip, &c.width, &c.gap].concat();
-            let cells = head.into_iter().chain([zone.into()]).chain(names);
-            self.tables[1].row(&cells.chain(numbers.into_iter().map(Into::into)).collect::<Vec<_>>())?;
+            let [warp_direction_deg, weft_direction_deg] = c.direction.map(f64::to_degrees);
+            self.each.row(&rows::Crossing {
+                time_s: frame.time,
+                shear_angle_deg: angle,
+                displacement_mm: frame.displacement_mm,
+                zone: self.zones().map_or("none", |zones| zones.all[i].name()).into(),
+                warp: mesh.blocks[pair.warp].name.clone(),
+                weft: mesh.blocks[pair.weft].name.clone(),
+                reference_x_mm: pair.reference.x,
+                reference_y_mm: pair.reference.y,
+                x_mm: c.position.x,
+                y_mm: c.position.y,
+                z_mm: c.position.z,
+                effective_angle_deg: c.angle.to_degrees(),
+                warp_direction_deg,
+                weft_direction_deg,
+                slip_x_mm: c.slip.x,
+                slip_y_mm: c.slip.y,
+                warp_width_mm: c.width[0],
+                weft_width_mm: c.width[1],
+                warp_gap_mm: c.gap[0],
+                weft_gap_mm: c.gap[1],
+            })?;
         }
         // yarns that cross no longer have no place on a map
         let there: Vec<usize> = (0..crossings.len()).filter(|&i| crossings[i].angle.is_finite()).collect();
-        let points: Vec<[f64; 3]> = there.iter().map(|&i| crossings[i].position).collect();
+        let points: Vec<[f64; 3]> = there.iter().map(|&i| crossings[i].position.to_array()).collect();
         let field = |name: &str, value: &dyn Fn(usize) -> f64| Field {
             name: name.into(),
             components: 1,
@@ -137,7 +185,7 @@ impl Crossed {
             field("warp_width_mm", &|i| crossings[i].width[0]),
             field("weft_width_mm", &|i| crossings[i].width[1]),
         ];
-        if let Some(zones) = &self.zones {
+        if let Some(zones) = self.zones() {
             fields.push(field("zone", &|i| f64::from(zones.all[i] as u8)));
         }
         map::write(&points, &fields, &dir.join(&file))?;
@@ -146,44 +194,61 @@ impl Crossed {
     }
 }
 
+/// Columns of the zones; `theory` is the angle of zone C without slip, rad.
+fn by_zone(means: &Means, theory: f64) -> rows::Zones {
+    let [angle, spread] = [means.angle, means.angle_std].map(|zones| zones.map(f64::to_degrees));
+    let direction = means.direction.map(f64::to_degrees);
+    rows::Zones {
+        theory_angle_deg: theory.to_degrees(),
+        zone_a_angle_deg: angle[0],
+        zone_b_angle_deg: angle[1],
+        zone_c_angle_deg: angle[2],
+        zone_a_angle_std_deg: spread[0],
+        zone_b_angle_std_deg: spread[1],
+        zone_c_angle_std_deg: spread[2],
+        zone_a_slip_mm: means.slip[0],
+        zone_b_slip_mm: means.slip[1],
+        zone_c_slip_mm: means.slip[2],
+        zone_c_warp_width_mm: means.width[0],
+        zone_c_weft_width_mm: means.width[1],
+        zone_c_warp_gap_mm: means.gap[0],
+        zone_c_weft_gap_mm: means.gap[1],
+        zone_c_warp_broadness_mm: means.broadness[0],
+        zone_c_weft_broadness_mm: means.broadness[1],
+        zone_c_warp_direction_deg: direction[0],
+        zone_c_weft_direction_deg: direction[1],
+    }
+}
+
 /// Maps of the crossings in a report: at the last of the loaded frames, or at some of them, evenly chosen, in colours of one range.
 pub(super) fn maps(results: &Results, page: &mut Page, most: usize) -> Result<()> {
     let Some(table) = results.other("crossings.csv")?.filter(|t| !t.is_empty()) else { return Ok(()) };
-    let times = table.texts("time_s");
-    let mut frames = times.clone();
-    frames.dedup();
+    let crossings: Vec<rows::Crossing> = table.rows()?;
     let several = most > 1;
-    let displacements = table.numbers("displacement_mm");
-    let place = |time: &str| times.iter().position(|t| *t == time).map_or(f64::NAN, |row| displacements[row]);
-    if several {
-        frames.retain(|time| place(time) > 0.0);
-    }
+    let all = || crossings.chunk_by(|a, b| a.time_s == b.time_s);
+    let mut frames: Vec<_> = all().filter(|frame| !several || frame[0].displacement_mm > 0.0).collect();
     if frames.is_empty() {
-        frames.push(times[times.len() - 1]);
+        frames.extend(all().last());
     }
     let (count, last) = (most.min(frames.len()), frames.len() - 1);
-    let chosen: Vec<&str> = (1..=count).map(|k| frames[last * k / count]).collect();
-    let (x, y) = (table.numbers("x_mm"), table.numbers("y_mm"));
+    let chosen: Vec<_> = (1..=count).map(|k| frames[last * k / count]).collect();
     page.heading(if several { "Crossings while the specimen is pulled" } else { "Crossings at the last frame" });
     page.raw("<div class=\"charts\">");
-    let maps = [
-        ("effective_angle_deg", "effective shear angle, degrees"),
-        ("warp_gap_mm", "gap of the warp, mm"),
-        ("weft_gap_mm", "gap of the weft, mm"),
+    type Value = fn(&rows::Crossing) -> f64;
+    let maps: [(Value, &str); 3] = [
+        (|c| c.effective_angle_deg, "effective shear angle, degrees"),
+        (|c| c.warp_gap_mm, "gap of the warp, mm"),
+        (|c| c.weft_gap_mm, "gap of the weft, mm"),
     ];
-    for (column, name) in maps {
-        let values = table.numbers(column);
-        let range = if several { middle(chosen.iter().flat_map(|time| at(&times, time, &values))) } else { None };
-        for time in &chosen {
-            let points: Vec<[f64; 3]> = at(&times, time, &x)
-                .zip(at(&times, time, &y))
-                .zip(at(&times, time, &values))
-                .map(|((x, y), v)| [x, y, v])
-                .collect();
+    for (value, name) in maps {
+        let range = if several { middle(chosen.iter().copied().flatten().map(value)) } else { None };
+        for frame in &chosen {
+            let points: Vec<[f64; 3]> = frame.iter().map(|c| [c.x_mm, c.y_mm, value(c)]).collect();
             let shown = points.iter().filter(|p| p.iter().all(|v| v.is_finite())).count();
-            let mut caption = format!("{shown} crossings at t = {} s", short(time));
+            let mut caption = format!("{shown} crossings at t = {} s", short(&text(frame[0].time_s)));
             if several {
-                caption += &format!(", d = {:.2} mm; colours as in the other maps of this size", place(time));
+                let place = frame[0].displacement_mm;
+                caption += &format!(", d = {place:.2} mm; colours as in the other maps of this size");
             }
             if let Some(svg) = chart::map(name, &points, range) {
                 page.figure(name, &svg, &caption);
@@ -192,11 +257,6 @@ pub(super) fn maps(results: &Results, page: &mut Page, most: usize) -> Result<()
     }
     page.raw("</div>");
     Ok(())
-}
-
-/// Values of the rows at a time.
-fn at<'a>(times: &'a [&str], time: &'a str, values: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-    values.iter().zip(times).filter(move |(_, t)| **t == time).map(|(v, _)| *v)
 }
 
 /// Range of values without the outermost at both ends; `None` if there is none.

@@ -4,9 +4,11 @@ use crate::error::Result;
 use crate::kernel::record::Record;
 use crate::measure::yarns::Yarn;
 use crate::mesh::frame::Frame;
-use crate::output::table::Table;
+use crate::output::appended::Appended;
+use crate::output::table::{Named, Table};
 use crate::settings::steps::Step;
 use crate::simulate::Simulation;
+use serde::Serialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -21,10 +23,19 @@ impl Tables {
     /// A table by its file name.
     ///
     /// # Errors
-    /// A file that cannot be written, or is no table with these columns.
-    pub fn open(&self, name: &str, header: &[&str]) -> Result<Table> {
+    /// A file that cannot be written.
+    pub fn open<R: Serialize + Default>(&self, name: &str) -> Result<Table<R>> {
         let path = self.dir.join(name);
-        if self.goes_on { Table::open(&path, header.len()) } else { Table::create(&path, header) }
+        if self.goes_on { Table::open(&path) } else { Table::create(&path) }
+    }
+
+    /// A table whose columns depend on the scene.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn named(&self, name: &str, columns: &[String]) -> Result<Named> {
+        let path = self.dir.join(name);
+        if self.goes_on { Named::open(&path, columns.len()) } else { Named::create(&path, columns) }
     }
 }
 
@@ -86,8 +97,8 @@ pub trait Observer {
         false
     }
 
-    /// Tables, always in the same order.
-    fn tables(&mut self) -> Vec<&mut Table> {
+    /// Files of its tables, always in the same order.
+    fn tables(&mut self) -> Vec<&mut Appended> {
         Vec::new()
     }
 

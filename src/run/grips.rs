@@ -1,7 +1,9 @@
 //! Forces of grips in every row: `reactions.csv`, and the force of the machine of a scene with conditions.
 
 use crate::error::Result;
-use crate::output::table::{Cell, REACTIONS, Table};
+use crate::output::rows::Reaction;
+use crate::output::table::Table;
+use crate::rigs::observer::Tables;
 use crate::scene::Motion;
 use crate::simulate::Simulation;
 
@@ -11,12 +13,12 @@ pub(super) struct Grips {
     /// Prescribed nodes of each grip, by their place in the list of reactions, with the components that count as its own: what two
     /// grips prescribe belongs to the first.
     own: Vec<Vec<(usize, [bool; 3])>>,
-    pub(super) table: Table,
+    pub(super) table: Table<Reaction>,
 }
 
 impl Grips {
     /// Those of a simulation; `None` if nothing is prescribed.
-    pub(super) fn of(simulation: &Simulation, table: impl Fn(&str, &[&str]) -> Result<Table>) -> Result<Option<Self>> {
+    pub(super) fn of(simulation: &Simulation, tables: &Tables) -> Result<Option<Self>> {
         let grips = simulation.scene.motions.clone();
         if grips.is_empty() {
             return Ok(None);
@@ -33,7 +35,7 @@ impl Grips {
             own
         });
         let own = own.collect();
-        Ok(Some(Self { grips, own, table: table("reactions.csv", REACTIONS)? }))
+        Ok(Some(Self { grips, own, table: tables.open("reactions.csv")? }))
     }
 
     /// Force of each grip on the scene, N: what balances the forces of the scene on its prescribed components.
@@ -55,10 +57,15 @@ impl Grips {
         simulation.alive()?;
         let forces = self.forces(&reactions);
         for (grip, force) in self.grips.iter().zip(&forces) {
-            let head = [simulation.time(), simulation.displacement()].map(Cell::from);
-            let numbers = [force[0], force[1], force[2], size(*force)].map(Cell::from);
-            let cells = head.into_iter().chain([grip.name.as_str().into()]).chain(numbers);
-            self.table.row(&cells.collect::<Vec<_>>())?;
+            self.table.row(&Reaction {
+                time_s: simulation.time(),
+                displacement_mm: simulation.displacement(),
+                condition: grip.name.clone(),
+                force_x_n: force[0],
+                force_y_n: force[1],
+                force_z_n: force[2],
+                force_n: size(*force),
+            })?;
         }
         let reach = self.grips.iter().map(|grip| size(grip.displacement)).fold(0.0, f64::max);
         if reach > 0.0 {

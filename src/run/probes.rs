@@ -3,14 +3,15 @@
 use crate::case::output::{Place, Probe};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
-use crate::output::table::Table;
+use crate::output::table::Named;
+use crate::rigs::observer::Tables;
 use crate::simulate::Simulation;
 
 /// The probes of a run.
 pub(super) struct Probes {
     /// Nodes of each.
     nodes: Vec<Vec<usize>>,
-    pub(super) table: Table,
+    pub(super) table: Named,
 }
 
 impl Probes {
@@ -18,11 +19,7 @@ impl Probes {
     ///
     /// # Errors
     /// Names a probe that is nowhere in the mesh.
-    pub(super) fn of(
-        probes: &[Probe],
-        mesh: &Mesh,
-        table: impl Fn(&str, &[&str]) -> Result<Table>,
-    ) -> Result<Option<Self>> {
+    pub(super) fn of(probes: &[Probe], mesh: &Mesh, tables: &Tables) -> Result<Option<Self>> {
         if probes.is_empty() {
             return Ok(None);
         }
@@ -30,8 +27,7 @@ impl Probes {
         let own = probes.iter().flat_map(|probe| ["x", "y", "z"].map(|axis| format!("{} {axis}_mm", probe.name)));
         let names: Vec<String> =
             ["time_s", "shear_angle_deg", "displacement_mm"].map(str::to_owned).into_iter().chain(own).collect();
-        let table = table("probes.csv", &names.iter().map(String::as_str).collect::<Vec<_>>())?;
-        Ok(Some(Self { nodes, table }))
+        Ok(Some(Self { nodes, table: tables.named("probes.csv", &names)? }))
     }
 
     /// A row: mean displacement of the nodes of each probe from where they were given, with the deformation of the cell.
@@ -45,7 +41,7 @@ impl Probes {
             };
             numbers.extend([0, 1, 2].map(mean));
         }
-        self.table.numbers(&numbers)
+        self.table.numbers(numbers)
     }
 }
 

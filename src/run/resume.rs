@@ -5,10 +5,10 @@ use super::{CASE, FINISHED, Options};
 use crate::case::{Case, parse};
 use crate::error::{Error, Guard, Result};
 use crate::kernel::record::{Record, Recorded};
+use crate::output::appended::Appended;
 use crate::output::checkpoint::{self, Checkpoint};
 use crate::output::columns::Columns;
 use crate::output::directory;
-use crate::output::table::Table;
 use crate::simulate::Simulation;
 use serde_json::Value;
 use std::path::Path;
@@ -135,16 +135,18 @@ impl Run<'_> {
         (self.wall_before, self.started) = (wall, Instant::now());
     }
 
-    fn tables(&mut self) -> Vec<&mut Table> {
-        let tables = [&mut self.history, &mut self.energies, &mut self.contacts];
-        let grips = self.grips.iter_mut().map(|grips| &mut grips.table);
-        let probes = self.probes.iter_mut().map(|probes| &mut probes.table);
+    /// Files of the tables, always in the same order.
+    fn tables(&mut self) -> Vec<&mut Appended> {
+        let tables = [&mut self.history.file, &mut self.energies.file, &mut self.contacts.file];
+        let grips = self.grips.iter_mut().map(|grips| &mut grips.table.file);
+        let probes = self.probes.iter_mut().map(|probes| &mut probes.table.file);
+        let yarns = self.yarns.iter_mut().flat_map(|(plies, each)| [&mut plies.file, &mut each.file]);
         tables
             .into_iter()
             .chain(grips)
             .chain(probes)
-            .chain(self.yarns.iter_mut().flatten())
-            .chain(&mut self.stitches)
+            .chain(yarns)
+            .chain(self.stitches.iter_mut().map(|table| &mut table.file))
             .chain(self.observer.tables())
             .collect()
     }
@@ -186,7 +188,7 @@ impl Run<'_> {
         if self.loaded.case.output.checkpoint_wall_s.is_none() {
             return Ok(());
         }
-        let lengths = self.tables().into_iter().map(Table::settled).collect::<Result<Vec<u64>>>()?;
+        let lengths = self.tables().into_iter().map(Appended::settled).collect::<Result<Vec<u64>>>()?;
         self.write_state(lengths, end)
     }
 

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::measure::stitches;
 use crate::measure::yarns::{self, Yarn};
 use crate::mesh::Ply;
+use crate::output::rows::{self, Contacts, History, Stitches};
 use crate::rigs::observer::{Loading, Seen};
 
 impl Run<'_> {
@@ -37,18 +38,18 @@ impl Run<'_> {
             let tensions = self.simulation.tensions();
             self.simulation.alive()?;
             let t = stitches::measure(self.simulation.mesh(), &tensions)?;
-            table.numbers(&[
-                time,
-                degrees,
-                t.all.min_n,
-                t.all.mean_n,
-                t.all.max_n,
-                t.all.slack_share,
-                t.loops.mean_n,
-                t.loops.slack_share,
-                t.underlaps.mean_n,
-                t.underlaps.slack_share,
-            ])?;
+            table.row(&Stitches {
+                time_s: time,
+                shear_angle_deg: degrees,
+                tension_min_n: t.all.min_n,
+                tension_mean_n: t.all.mean_n,
+                tension_max_n: t.all.max_n,
+                slack_share: t.all.slack_share,
+                loop_tension_mean_n: t.loops.mean_n,
+                loop_slack_share: t.loops.slack_share,
+                underlap_tension_mean_n: t.underlaps.mean_n,
+                underlap_slack_share: t.underlaps.slack_share,
+            })?;
         }
         Ok(())
     }
@@ -72,52 +73,75 @@ impl Run<'_> {
     fn write_history(&mut self, loading: &Loading, phase: &str) -> Result<()> {
         let &Loading { degrees, force, normalised } = loading;
         let s = &self.simulation;
-        let (time, displacement) = (s.time(), s.displacement());
+        let time = s.time();
         let (e, h) = (s.energies(), s.health());
-        self.history.row(&[
-            time.into(),
-            (s.step() as f64).into(),
-            phase.into(),
-            s.dt().into(),
-            degrees.into(),
-            displacement.into(),
-            force.into(),
-            normalised.into(),
-            e.internal().into(),
-            e.kinetic_total.into(),
-            h.balance.into(),
-            h.penetration.into_iter().fold(0.0, f64::max).into(),
-            h.min_jacobian.into(),
-            (self.retries.guards().len() as f64).into(),
-        ])?;
-        let numbers: Vec<f64> = [time, degrees].into_iter().chain(e.columns().map(|(_, value)| value)).collect();
-        self.energies.numbers(&numbers)?;
-        let counts = h.touching.map(f64::from);
-        let numbers: Vec<f64> = [&[time, degrees][..], &counts, &h.penetration, &h.added_mass, &[h.dt_limit]].concat();
-        self.contacts.numbers(&numbers)
+        self.history.row(&History {
+            time_s: time,
+            step: s.step(),
+            phase: phase.into(),
+            dt_s: s.dt(),
+            shear_angle_deg: degrees,
+            displacement_mm: s.displacement(),
+            force_n: force,
+            f_nor_n_per_mm: normalised,
+            e_internal_mj: e.internal(),
+            e_kinetic_mj: e.kinetic_total,
+            e_balance_error: h.balance,
+            max_penetration_mm: h.penetration.into_iter().fold(0.0, f64::max),
+            min_jacobian: h.min_jacobian,
+            retries: self.retries.guards().len(),
+        })?;
+        self.energies.numbers([time, degrees].into_iter().chain(e.columns().map(|(_, value)| value)))?;
+        self.contacts.row(&Contacts {
+            time_s: time,
+            shear_angle_deg: degrees,
+            thread_nodes_on_yarns: h.touching[0],
+            yarn_nodes_on_yarns: h.touching[1],
+            beams_on_beams: h.touching[2],
+            thread_yarn_penetration_mm: h.penetration[0],
+            yarn_yarn_penetration_mm: h.penetration[1],
+            thread_thread_penetration_mm: h.penetration[2],
+            added_mass_yarns: h.added_mass[0],
+            added_mass_threads: h.added_mass[1],
+            dt_limit_s: h.dt_limit,
+        })
     }
 
     /// Sizes by ply, and yarn by yarn.
     fn write_yarns(&mut self, time: f64, degrees: f64, yarns: &[Yarn]) -> Result<()> {
-        let Some([table, each]) = &mut self.yarns else { return Ok(()) };
-        let plies = [Ply::Warp, Ply::Weft].map(|ply| yarns::ply(yarns, ply));
-        let means = plies.map(|p| [p.width.mean, p.thickness.mean, p.gap.mean]);
-        let spreads = plies.map(|p| [p.width.std, p.thickness.std, p.gap.std]);
-        let broadness = plies.map(|p| p.broadness.mean);
-        table.numbers(&[&[time, degrees][..], &means.concat(), &spreads.concat(), &broadness].concat())?;
+        let Some((plies, each)) = &mut self.yarns else { return Ok(()) };
+        let [warp, weft] = [Ply::Warp, Ply::Weft].map(|ply| yarns::ply(yarns, ply));
+        plies.row(&rows::Yarns {
+            time_s: time,
+            shear_angle_deg: degrees,
+            warp_width_mm: warp.width.mean,
+            warp_thickness_mm: warp.thickness.mean,
+            warp_gap_mm: warp.gap.mean,
+            weft_width_mm: weft.width.mean,
+            weft_thickness_mm: weft.thickness.mean,
+            weft_gap_mm: weft.gap.mean,
+            warp_width_std_mm: warp.width.std,
+            warp_thickness_std_mm: warp.thickness.std,
+            warp_gap_std_mm: warp.gap.std,
+            weft_width_std_mm: weft.width.std,
+            weft_thickness_std_mm: weft.thickness.std,
+            weft_gap_std_mm: weft.gap.std,
+            warp_broadness_mm: warp.broadness.mean,
+            weft_broadness_mm: weft.broadness.mean,
+        })?;
         for yarn in yarns {
             let sizes = yarn.sizes();
-            each.row(&[
-                time.into(),
-                degrees.into(),
-                self.simulation.mesh().blocks[yarn.block].name.as_str().into(),
-                sizes.width.mean.into(),
-                sizes.thickness.mean.into(),
-                sizes.gap.mean.into(),
-                sizes.broadness.mean.into(),
-                sizes.width.min.into(),
-                sizes.width.max.into(),
-            ])?;
+            each.row(&rows::Yarn {
+                time_s: time,
+                shear_angle_deg: degrees,
+                yarn: self.simulation.mesh().blocks[yarn.block].name.clone(),
+                width_mm: sizes.width.mean,
+                thickness_mm: sizes.thickness.mean,
+                gap_mm: sizes.gap.mean,
+                broadness_mm: sizes.broadness.mean,
+                width_min_mm: sizes.width.min,
+                width_max_mm: sizes.width.max,
+            })?;
         }
         Ok(())
     }

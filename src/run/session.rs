@@ -9,7 +9,8 @@ use crate::error::{Error, Result};
 use crate::mesh::Ply;
 use crate::output::directory;
 use crate::output::lock::Lock;
-use crate::output::table::{CONTACTS, HISTORY, STITCHES, Table, YARNS, YARNS_EACH};
+use crate::output::rows::{Contacts, History, Stitches, Yarn, Yarns};
+use crate::output::table::{Named, Table};
 use crate::rigs;
 use crate::rigs::observer::{Observer, Tables};
 use crate::rigs::read::Loaded;
@@ -71,11 +72,11 @@ pub(super) struct Run<'a> {
     pub(super) options: &'a Options,
     pub(super) simulation: Simulation,
     pub(super) stopped: Arc<AtomicBool>,
-    pub(super) history: Table,
-    pub(super) energies: Table,
-    pub(super) contacts: Table,
-    pub(super) yarns: Option<[Table; 2]>,
-    pub(super) stitches: Option<Table>,
+    pub(super) history: Table<History>,
+    pub(super) energies: Named,
+    pub(super) contacts: Table<Contacts>,
+    pub(super) yarns: Option<(Table<Yarns>, Table<Yarn>)>,
+    pub(super) stitches: Option<Table<Stitches>>,
     pub(super) grips: Option<Grips>,
     pub(super) probes: Option<Probes>,
     /// What only the rig measures.
@@ -120,9 +121,10 @@ impl<'a> Run<'a> {
         goes_on: bool,
     ) -> Result<Self> {
         let dir = &options.output;
-        let energies: Vec<&str> = ["time_s", "shear_angle_deg"]
+        let energies: Vec<String> = ["time_s", "shear_angle_deg"]
             .into_iter()
             .chain(simulation.energies().columns().map(|(name, _)| name))
+            .map(str::to_owned)
             .collect();
         let mesh = simulation.mesh();
         let plies = mesh.blocks.iter().any(|b| b.ply == Ply::Warp) && mesh.blocks.iter().any(|b| b.ply == Ply::Weft);
@@ -130,17 +132,16 @@ impl<'a> Run<'a> {
         let folder = dir.join("frames");
         std::fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, e))?;
         let tables = Tables { dir: dir.clone(), goes_on };
-        let table = |name: &str, header: &[&str]| tables.open(name, header);
         Ok(Self {
             loaded,
             options,
-            history: table("history.csv", HISTORY)?,
-            energies: table("energies.csv", &energies)?,
-            contacts: table("contacts.csv", CONTACTS)?,
-            yarns: if plies { Some([table("yarns.csv", YARNS)?, table("yarns_each.csv", YARNS_EACH)?]) } else { None },
-            stitches: if threads { Some(table("stitches.csv", STITCHES)?) } else { None },
-            grips: Grips::of(&simulation, table)?,
-            probes: Probes::of(&loaded.case.output.probes, mesh, table)?,
+            history: tables.open("history.csv")?,
+            energies: tables.named("energies.csv", &energies)?,
+            contacts: tables.open("contacts.csv")?,
+            yarns: if plies { Some((tables.open("yarns.csv")?, tables.open("yarns_each.csv")?)) } else { None },
+            stitches: if threads { Some(tables.open("stitches.csv")?) } else { None },
+            grips: Grips::of(&simulation, &tables)?,
+            probes: Probes::of(&loaded.case.output.probes, mesh, &tables)?,
             observer: rigs::of(&loaded.case.domain).observer(&loaded.case, &simulation, &tables)?,
             retries: Retries::of(&simulation),
             simulation,

@@ -5,19 +5,32 @@ use super::results::{MEASURES, Measure, Results};
 use crate::case::differences::differences;
 use crate::case::validate::brief;
 use crate::error::{Error, Result};
+use crate::output::rows::number;
 use crate::output::table::Table;
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
 
 /// Largest number of listed differences between the cases.
 const PLACES: usize = 40;
-/// Columns of the table: a measure or a number of the summary, the relative differences of the first run from the second, and the
-/// values of both at the end of their common range.
-const COMPARED: &[&str] = &["measure", "unit", "relative_l2", "relative_rms", "a", "b"];
 /// Numbers of the summary: name there, name and unit here.
 const FACTS: [[&str; 3]; 3] =
     [["steps", "steps", "1"], ["wall_s", "wall time", "s"], ["worst_energy_balance", "energy balance error", "1"]];
+
+/// A row of the table: a measure or a number of the summary of both runs.
+#[serde_with::apply(f64 => #[serde(serialize_with = "number")])]
+#[derive(Default, Serialize)]
+struct Row {
+    measure: &'static str,
+    unit: &'static str,
+    /// Relative differences of the first run from the second one.
+    relative_l2: f64,
+    relative_rms: f64,
+    /// Values of both runs at the end of their common range.
+    a: f64,
+    b: f64,
+}
 
 /// Differences between the results of two runs.
 #[derive(Debug, Clone)]
@@ -65,13 +78,12 @@ impl Comparison {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let mut table = Table::create(path, COMPARED)?;
-        for (measure, Difference { l2, rms }, [a, b]) in &self.measures {
-            let cells = [measure.name.into(), measure.unit.into(), (*l2).into(), (*rms).into(), (*a).into()];
-            table.row(&[&cells[..], &[(*b).into()]].concat())?;
+        let mut table = Table::create(path)?;
+        for &(measure, Difference { l2, rms }, [a, b]) in &self.measures {
+            table.row(&Row { measure: measure.name, unit: measure.unit, relative_l2: l2, relative_rms: rms, a, b })?;
         }
-        for ([_, name, unit], [a, b]) in self.facts() {
-            table.row(&[name.into(), unit.into(), f64::NAN.into(), f64::NAN.into(), a.into(), b.into()])?;
+        for ([_, measure, unit], [a, b]) in self.facts() {
+            table.row(&Row { measure, unit, relative_l2: f64::NAN, relative_rms: f64::NAN, a, b })?;
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use super::difference::difference;
 use super::results::{MEASURES, Measure, Results};
 use crate::error::{Error, Guard, Result};
 use crate::output::directory;
-use crate::output::table::{Cell, Table};
+use crate::output::table::{Named, text as number};
 use crate::rigs::read::Loaded;
 use crate::run::effects::effects as effects_of;
 use crate::run::interleaved_timing::{Ratio, ratio, trial};
@@ -94,17 +94,14 @@ pub fn effects(loaded: &Loaded, options: &Options) -> Result<Study> {
     let measures: Vec<&Measure> = MEASURES.iter().filter(|m| !whole.results.curve(m).is_empty()).collect();
     let header = COLUMNS.map(String::from).into_iter().chain(measures.iter().map(|m| m.name.replace(' ', "_") + "_l2"));
     let header: Vec<String> = header.collect();
-    let mut table = Table::create(&options.table, &header.iter().map(String::as_str).collect::<Vec<_>>())?;
+    let mut table = Named::create(&options.table, &header)?;
     let mut rows = Vec::new();
     for (name, variant) in variants {
         let Some(done) = finish(&variant, &folder.join(slug(name)), options)? else { return Ok(interrupted()) };
         let row = compare(name, &done, &whole, &measures, options)?;
-        let cells: Vec<Cell> = [row.name.into(), row.verdict.as_str().into()]
-            .into_iter()
-            .chain([row.steps, row.step_time.median, row.step_time.spread, row.run_time].map(Cell::from))
-            .chain(row.changes.iter().map(|change| Cell::from(*change)))
-            .collect();
-        table.row(&cells)?;
+        let numbers = [row.steps, row.step_time.median, row.step_time.spread, row.run_time];
+        let numbers = numbers.iter().chain(&row.changes).map(|value| number(*value));
+        table.row(&[row.name.to_owned(), row.verdict.clone()].into_iter().chain(numbers).collect::<Vec<_>>())?;
         rows.push(row);
     }
     Ok(Study { text: text(&whole, &measures, &rows, &options.table), interrupted: false })

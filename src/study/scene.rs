@@ -243,7 +243,7 @@ impl Observed {
         self.drift = now.iter().zip(before).map(|(a, b)| vector::norm(vector::sub(*a, *b))).fold(0.0, f64::max);
         self.displacements = now.iter().map(|w| vector::norm(*w)).collect();
         self.displacements.sort_by(f64::total_cmp);
-        self.thickness_ratio = thickness_ratio(&s.mesh(), &now);
+        self.thickness_ratio = thickness_ratio(s.mesh(), &now);
         let tensions = s.tensions();
         self.tension = tensions.iter().copied().fold(f64::NAN, f64::max);
     }

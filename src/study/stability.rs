@@ -3,28 +3,33 @@
 use super::scene::Scenes;
 use crate::backend::gpu::Device;
 use crate::error::{Error, Result};
+use crate::output::rows::number;
 use crate::output::table::Table;
 use crate::run::Machine;
 use crate::settings::integration::Precision;
 use crate::simulate::BackendConfig;
+use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Columns of `stability.csv`. Steps and limits are the smallest of a run, errors and penetrations the largest; the limit is the
-/// estimate in use, without factors.
-const STABILITY: &[&str] = &[
-    "scene",
-    "backend",
-    "steps",
-    "retries",
-    "dt_s",
-    "estimated_limit_s",
-    "energy_balance_error",
-    "penetration_mm",
-    "min_jacobian",
-    "verdict",
-    "as_expected",
-];
+/// A row of `stability.csv`. Steps and limits are the smallest of a run, errors and penetrations the largest.
+#[serde_with::apply(f64 => #[serde(serialize_with = "number")])]
+#[derive(Default, Serialize)]
+struct Row {
+    scene: String,
+    backend: &'static str,
+    steps: u64,
+    retries: usize,
+    dt_s: f64,
+    /// The estimate in use, without factors.
+    estimated_limit_s: f64,
+    energy_balance_error: f64,
+    penetration_mm: f64,
+    min_jacobian: f64,
+    verdict: &'static str,
+    /// `yes`, `no`, or `-` where the run was cut short.
+    as_expected: &'static str,
+}
 
 /// Result of a study.
 pub struct Study {
@@ -76,7 +81,7 @@ pub fn stability(folder: &Path, machine: Machine, longest: Option<u64>, table: &
     if let Some(parent) = table.parent() {
         std::fs::create_dir_all(parent).map_err(|e| Error::file(parent, e))?;
     }
-    let mut rows = Table::create(table, STABILITY)?;
+    let mut rows = Table::create(table)?;
     let (mut text, mut failed) = (String::new(), 0);
     for (machine, config) in machines {
         let mut scenes = Scenes::new(config).longest(longest.unwrap_or(u64::MAX));
@@ -88,26 +93,23 @@ pub fn stability(folder: &Path, machine: Machine, longest: Option<u64>, table: &
             }
             let ended = if seen.cut { "cut short" } else { seen.verdict.name() };
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
-            rows.row(&[
-                name.as_ref().into(),
-                machine.into(),
-                (seen.steps as f64).into(),
-                (seen.retries as f64).into(),
-                seen.dt.into(),
-                seen.dt_limit.into(),
-                seen.balance.into(),
-                seen.penetration.into(),
-                seen.min_jacobian.into(),
-                ended.into(),
-                if seen.cut {
-                    "-"
-                } else if broken.is_empty() {
-                    "yes"
-                } else {
-                    "no"
-                }
-                .into(),
-            ])?;
+            rows.row(&Row {
+                scene: name.to_string(),
+                backend: machine,
+                steps: seen.steps,
+                retries: seen.retries,
+                dt_s: seen.dt,
+                estimated_limit_s: seen.dt_limit,
+                energy_balance_error: seen.balance,
+                penetration_mm: seen.penetration,
+                min_jacobian: seen.min_jacobian,
+                verdict: ended,
+                as_expected: match (seen.cut, broken.is_empty()) {
+                    (true, _) => "-",
+                    (false, true) => "yes",
+                    (false, false) => "no",
+                },
+            })?;
             // writing to a String does not fail
             let _ = writeln!(
                 text,

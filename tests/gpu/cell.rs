@@ -67,7 +67,7 @@ struct Result {
 fn result(mut cell: Simulation) -> Result {
     let ends: Vec<f64> = cell.schedule.phases().iter().map(|p| p.end).collect();
     cell.advance(ends[1], |_| false).unwrap_or_else(|e| panic!("{e}"));
-    let yarns = yarns::measure(&cell.mesh(), &cell.frame()).unwrap();
+    let yarns = yarns::measure(cell.mesh(), &cell.frame()).unwrap();
     let plies = [Ply::Warp, Ply::Weft].map(|ply| yarns::ply(&yarns, ply));
     let sizes = plies.iter().flat_map(|p| [p.width.mean, p.thickness.mean, p.gap.mean]).collect();
     let area = cell.mesh().period.map(|[x, y]| x * y).unwrap();

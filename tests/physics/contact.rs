@@ -219,7 +219,7 @@ fn pass(what: &str, slab: Value, nodes: [[f64; 3]; 2], moved: [f64; 3], beyond: 
                 let mut expected = [0.0; 3];
                 for k in 0..count {
                     let share = (k as f64 + 0.5) / count as f64;
-                    let vector = push(&s.mesh(), &s.mesh().nodes, [x[0] + share * length, x[1], x[2]], radius);
+                    let vector = push(s.mesh(), &s.mesh().nodes, [x[0] + share * length, x[1], x[2]], radius);
                     (0..3).for_each(|k| expected[k] += stiffness * (1.0 - share) * vector[k]);
                 }
                 let got = s.reactions()[s.reactions().len() - 2];

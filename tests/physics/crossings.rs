@@ -2,6 +2,7 @@
 //! known, and of a tightened cell, whose prescribed angle is known.
 
 use crate::common::{advance, below, loaded, near};
+use glam::DVec2;
 use serde_json::{Value, json};
 use tricot::measure::crossings::{Crossings, angles, slips};
 use tricot::measure::yarns;
@@ -99,13 +100,13 @@ fn pulled(mesh: &Mesh, angle: f64) -> Frame {
 #[test]
 fn three_zones_have_the_angles_of_the_theory() {
     let mesh = specimen();
-    let strip = Strip { centre: [0.0; 2], axis: [1.0, 0.0], length: LENGTH, width: WIDTH };
+    let strip = Strip { centre: DVec2::ZERO, axis: DVec2::X, length: LENGTH, width: WIDTH };
     let crossings = Crossings::of(&mesh, strip.axis);
     println!("{} yarns, {} crossings", mesh.blocks.len(), crossings.pairs.len());
     // as many as there are points of the two families of lines in the rectangle
     let expected = LENGTH * WIDTH / (5.0 * 2.5);
     near("crossings", crossings.pairs.len() as f64, expected, 0.03);
-    let diagonals = [[1.0, 1.0], [1.0, -1.0]];
+    let diagonals = [DVec2::ONE, DVec2::new(1.0, -1.0)];
     // directions look one section ahead and back, and yarns are as wide as their pitch
     let zones: Vec<Option<Zone>> = crossings.pairs.iter().map(|p| strip.core(p.reference, diagonals, 8.0)).collect();
     let bias = Bias::new(LENGTH, WIDTH).unwrap();
@@ -134,14 +135,14 @@ fn three_zones_have_the_angles_of_the_theory() {
 #[test]
 fn plies_that_slide_lower_the_angle_and_yarns_that_part_have_none() {
     let mesh = specimen();
-    let crossings = Crossings::of(&mesh, [1.0, 0.0]);
+    let crossings = Crossings::of(&mesh, DVec2::X);
     let mut frame = pulled(&mesh, 0.5);
     let weft = mesh.blocks.iter().find(|b| b.ply == Ply::Weft).unwrap().first;
     frame.positions[weft..].iter_mut().for_each(|p| p[0] += 3.0);
     let yarns = yarns::measure(&mesh, &frame).unwrap();
     let measured = crossings.measure(&mesh, &frame, &yarns).unwrap();
-    let strip = Strip { centre: [0.0; 2], axis: [1.0, 0.0], length: LENGTH, width: WIDTH };
-    let inside = |at: [f64; 2]| strip.core(at, [[1.0, 1.0], [1.0, -1.0]], 8.0).is_some();
+    let strip = Strip { centre: DVec2::ZERO, axis: DVec2::X, length: LENGTH, width: WIDTH };
+    let inside = |at: DVec2| strip.core(at, [DVec2::ONE, DVec2::new(1.0, -1.0)], 8.0).is_some();
     let core = || measured.iter().zip(&crossings.pairs).filter(|(_, p)| inside(p.reference)).map(|(c, _)| c);
     assert!(core().count() > 200);
     near("smallest slip inside the zones", slips(core()).min, 3.0, 1e-9);
@@ -167,11 +168,11 @@ fn a_sheared_cell_follows_the_prescribed_angle() {
         "integration": { "energy_tolerance": 100 }
     });
     let mut simulation = run::simulation(&loaded(&case), BackendConfig::default()).unwrap();
-    let crossings = Crossings::of(&simulation.mesh(), [1.0, 1.0]);
+    let crossings = Crossings::of(simulation.mesh(), DVec2::ONE);
     advance(&mut simulation, 7e-4);
     let frame = simulation.frame();
-    let yarns = yarns::measure(&simulation.mesh(), &frame).unwrap();
-    let measured = crossings.measure(&simulation.mesh(), &frame, &yarns).unwrap();
+    let yarns = yarns::measure(simulation.mesh(), &frame).unwrap();
+    let measured = crossings.measure(simulation.mesh(), &frame, &yarns).unwrap();
     assert_eq!(measured.len(), 8);
     let spread = angles(measured.iter());
     println!("effective {:.3}° to {:.3}°", spread.min.to_degrees(), spread.max.to_degrees());

@@ -277,7 +277,7 @@ fn displaced(clamps: &str, steps: &Value) -> [Vec<[f64; 3]>; 2] {
     let end = simulation.schedule.end();
     simulation.advance(end, |_| false).unwrap_or_else(|e| panic!("{e}"));
     let all = simulation.fluctuations();
-    clamped(specimen(&loaded.case), &simulation.mesh()).map(|nodes| nodes.iter().map(|n| all[*n]).collect())
+    clamped(specimen(&loaded.case), simulation.mesh()).map(|nodes| nodes.iter().map(|n| all[*n]).collect())
 }
 
 #[test]

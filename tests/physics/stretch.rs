@@ -27,7 +27,7 @@ fn stiffness(s: &Simulation) -> [f64; 2] {
     let area = s.mesh().period.map(|[x, y]| x * y).unwrap();
     [0, 1].map(|axis| {
         let own = s.mesh().blocks.iter().filter(|b| b.fibre[axis].abs() > 0.5);
-        own.map(|b| quality::volume(&s.mesh(), b) * materials::choose(&b.material).2).sum::<f64>() / area
+        own.map(|b| quality::volume(s.mesh(), b) * materials::choose(&b.material).2).sum::<f64>() / area
     })
 }
 

@@ -4,6 +4,7 @@ use crate::common::{bare, block, loaded, near, neo_hookean, options, with};
 use serde_json::{Value, json};
 use std::path::Path;
 use tricot::output::columns::Columns;
+use tricot::output::rows::Reaction;
 use tricot::run::{check, run};
 
 const YOUNG: f64 = 100.0;
@@ -65,6 +66,31 @@ fn grips_of_a_bar_pull_with_its_force() {
         let rows = Columns::read(&dir.join("reactions.csv")).unwrap().len();
         assert_eq!(rows, 2 * Columns::read(&dir.join("history.csv")).unwrap().len(), "one row a grip");
     }
+}
+
+#[test]
+fn names_with_commas_and_quotes_survive_a_round_trip() {
+    let [body, grip, probe] = ["bar, the \"long\" one", "grip, \"left\"", "\", at"];
+    let case = with(
+        bar(0.0, 0.16),
+        &[
+            ("/domain/mesh/blocks/0/name", json!(body)),
+            ("/domain/mesh/conditions/0/name", json!(grip)),
+            ("/domain/mesh/conditions/0/body", json!(body)),
+            ("/output/probes/0/name", json!(probe)),
+            ("/steps", json!([{ "move": { "time_s": 1e-5 } }])),
+            ("/output/rows_per_step", json!(2)),
+        ],
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("bar");
+    run(&loaded(&case), &options(dir.clone(), 1)).unwrap();
+    let read = |table: &str| Columns::read(&dir.join(table)).unwrap();
+    let reactions: Vec<Reaction> = read("reactions.csv").rows().unwrap();
+    let names: Vec<&str> = reactions.iter().map(|row| row.condition.as_str()).collect();
+    assert_eq!(names, [grip, "right grip", grip, "right grip"]);
+    assert_eq!(read("probes.csv").names()[3..6], ["x", "y", "z"].map(|axis| format!("{probe} {axis}_mm")));
+    assert_eq!(read("probes.csv").numbers(&format!("{probe} x_mm")).len(), 2);
 }
 
 #[test]

@@ -8,8 +8,9 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+use tricot::output::columns::Columns;
 use tricot::output::picture::View;
-use tricot::output::table::{HISTORY, STITCHES, YARNS};
+use tricot::output::rows::{History, Stitches, Yarns};
 use tricot::output::vtu_read;
 use tricot::rigs::read::{Loaded, read};
 use tricot::run::{Outcome, picture, run};
@@ -91,9 +92,10 @@ fn a_run_leaves_what_the_readme_says() {
     assert!(!outcome.interrupted);
     assert!(outcome.text.lines().count() <= 12 && outcome.text.contains("finished"), "{}", outcome.text);
 
-    assert_eq!(table(&dir.join("history.csv")).0, HISTORY);
-    assert_eq!(table(&dir.join("yarns.csv")).0, YARNS);
-    assert_eq!(table(&dir.join("stitches.csv")).0, STITCHES);
+    let rows = |name: &str| Columns::read(&dir.join(name)).unwrap();
+    assert_eq!(rows("history.csv").rows::<History>().unwrap()[29].phase, "shear");
+    assert_eq!(rows("yarns.csv").rows::<Yarns>().unwrap().len(), 30);
+    assert_eq!(rows("stitches.csv").rows::<Stitches>().unwrap().len(), 30);
     for file in ["history.csv", "energies.csv", "stress.csv", "yarns.csv", "stitches.csv"] {
         let times = column(&dir.join(file), "time_s");
         assert_eq!(times.len(), 30, "{file}");

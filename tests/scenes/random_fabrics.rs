@@ -228,7 +228,7 @@ fn energies(s: &Simulation) -> [f64; 2] {
         for (slice, column, layer) in cells {
             let corners = block.corners(slice, column, layer);
             let at = corners.map(|n| s.mesh().position(n));
-            let moved = corners.map(|n| sub(frame.position(&s.mesh(), n), s.mesh().position(n)));
+            let moved = corners.map(|n| sub(frame.position(s.mesh(), n), s.mesh().position(n)));
             for gauss in tricot::mesh::CORNER_SIGNS {
                 let gauss = gauss.map(|sign| sign * point);
                 // ∂N/∂ξ of the eight corners
@@ -257,7 +257,7 @@ fn energies(s: &Simulation) -> [f64; 2] {
         for beam in 0..thread.beams() {
             let [a, b] = thread.beam(beam);
             let rest = norm(sub(s.mesh().position(b), s.mesh().position(a)));
-            let now = norm(sub(frame.position(&s.mesh(), b), frame.position(&s.mesh(), a)));
+            let now = norm(sub(frame.position(s.mesh(), b), frame.position(s.mesh(), a)));
             let e = now / rest - 1.0 - strain * shrinks(thread, beam);
             stretching += 0.5 * thread.axial / (1.0 + thread.excess[beam]) * rest * e * e;
         }

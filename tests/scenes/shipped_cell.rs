@@ -22,7 +22,7 @@ fn the_shipped_cell_tightens_to_its_tomography_and_shears_to_fifty_degrees() {
     let kinetic = energies.kinetic_total / energies.internal();
     println!("tightened: kinetic over internal {:.4} %, balance {:+.3} %", 100.0 * kinetic, 100.0 * health.balance);
     assert!(kinetic < 0.01, "{kinetic}");
-    let yarns = yarns::measure(&cell.mesh(), &cell.frame()).unwrap();
+    let yarns = yarns::measure(cell.mesh(), &cell.frame()).unwrap();
     for (ply, sizes) in TOMOGRAPHY {
         let measured = yarns::ply(&yarns, ply);
         let names = ["width", "thickness", "gap"];

@@ -34,7 +34,7 @@ fn advance(simulation: &mut Simulation, until: f64) {
 
 /// Mean tension of the stitch, N.
 fn tension(simulation: &Simulation) -> f64 {
-    stitches::measure(&simulation.mesh(), &simulation.tensions()).unwrap().all.mean_n
+    stitches::measure(simulation.mesh(), &simulation.tensions()).unwrap().all.mean_n
 }
 
 /// Ends of load steps, s.

@@ -9,10 +9,11 @@ use crate::error::{Error, Result};
 use crate::fabric;
 use crate::measure::stitches::{Leg, SLACK_BELOW_N, legs};
 use crate::mesh::{Mesh, Part, Ply};
-use crate::output::columns::Columns;
 use crate::output::results::Results;
+use crate::output::rows::{Crossing, Shear, Zones};
 use crate::output::vtu_read;
 use crate::rigs::crossings::MARGIN;
+use glam::{DVec2, DVec3, Vec3Swizzles};
 
 /// Angles of Eq. 18 at which the effective angle is stated, degrees.
 const STATED_DEG: [f64; 5] = [10.0, 20.0, 25.0, 30.0, 45.0];
@@ -24,14 +25,21 @@ const FRAMES: usize = 4;
 /// # Errors
 /// Files of the run that cannot be read.
 pub(super) fn findings(specimen: &Specimen, case: &Case, results: &Results) -> Result<Vec<String>> {
-    let Some(shear) = results.other("shear.csv")? else { return Ok(Vec::new()) };
+    let Some(table) = results.other("shear.csv")? else { return Ok(Vec::new()) };
+    let (shear, zones): (Vec<Shear>, Vec<Zones>) = (table.rows()?, table.rows()?);
     let phases = results.history.texts("phase");
     let rows: Vec<usize> = (0..phases.len().min(shear.len())).filter(|r| phases[*r] == "move").collect();
     let (Some(&first), Some(&last)) = (rows.first(), rows.last()) else { return Ok(Vec::new()) };
-    let pull = Pull { before: first.saturating_sub(1), rows, last, shear };
-    let plies = ["warp", "weft"];
-    let sentences = [pull.zones(), pull.lag()].into_iter().chain(plies.map(|ply| pull.widths(ply)));
-    let mut found: Vec<String> = sentences.chain(plies.map(|ply| pull.gaps(ply))).flatten().collect();
+    let pull = Pull { before: first.saturating_sub(1), rows, last, shear, zones };
+    let sentences = [
+        pull.zones(),
+        pull.lag(),
+        pull.widths("warp", |z| z.zone_c_warp_width_mm),
+        pull.widths("weft", |z| z.zone_c_weft_width_mm),
+        pull.gaps("warp", |z| z.zone_c_warp_gap_mm),
+        pull.gaps("weft", |z| z.zone_c_weft_gap_mm),
+    ];
+    let mut found: Vec<String> = sentences.into_iter().flatten().collect();
     found.extend(edges(specimen, results)?);
     found.extend(stitches(specimen, case, results)?);
     Ok(found)
@@ -39,16 +47,17 @@ pub(super) fn findings(specimen: &Specimen, case: &Case, results: &Results) -> R
 
 /// Slip at the free edges beside that inside, at the last frame.
 fn edges(specimen: &Specimen, results: &Results) -> Result<Option<String>> {
-    let Some(table) = results.other("crossings.csv")?.filter(|t| !t.is_empty()) else { return Ok(None) };
+    let Some(table) = results.other("crossings.csv")? else { return Ok(None) };
+    let crossings: Vec<Crossing> = table.rows()?;
+    let Some(last) = crossings.last() else { return Ok(None) };
     let width = specimen.width_mm;
-    let (times, zones) = (table.texts("time_s"), table.texts("zone"));
-    let [x, y, across] = ["slip_x_mm", "slip_y_mm", "reference_y_mm"].map(|name| table.numbers(name));
     let mean = |zone: &str, edge: bool| -> String {
-        let own = (0..times.len()).filter(|&i| {
-            let at_edge = across[i].abs() > (0.5 - MARGIN) * width;
-            times[i] == times[times.len() - 1] && zones[i] == zone && at_edge == edge
+        let own = crossings.iter().filter(|c| {
+            let at_edge = c.reference_y_mm.abs() > (0.5 - MARGIN) * width;
+            c.time_s == last.time_s && c.zone == zone && at_edge == edge
         });
-        let slips: Vec<f64> = own.map(|i| x[i].hypot(y[i])).filter(|slip| slip.is_finite()).collect();
+        let slips = own.map(|c| c.slip_x_mm.hypot(c.slip_y_mm));
+        let slips: Vec<f64> = slips.filter(|slip| slip.is_finite()).collect();
         match slips.len() {
             0 => "none".into(),
             count => format!("{:.3}", slips.iter().sum::<f64>() / count as f64),
@@ -101,7 +110,7 @@ fn carried(legs: &[&Leg]) -> String {
         let taut = share(own.iter().filter(|l| l.taut()).count());
         format!("{} {name} {mean:.3} N, {taut:.0} % taut", own.len())
     };
-    let along = |l: &Leg| l.chord[0].abs() > l.chord[1].abs();
+    let along = |l: &Leg| l.chord.x.abs() > l.chord.y.abs();
     [
         share("loops", &|l| l.part == Part::Loop),
         share("underlaps along the pull", &|l| l.part == Part::Underlap && along(l)),
@@ -112,13 +121,14 @@ fn carried(legs: &[&Leg]) -> String {
 }
 
 /// Direction of the fibres of a ply in the plane.
-fn direction(mesh: &Mesh, ply: Ply) -> [f64; 2] {
-    mesh.blocks.iter().find(|b| b.ply == ply).map_or([f64::NAN; 2], |b| [b.fibre[0], b.fibre[1]])
+fn direction(mesh: &Mesh, ply: Ply) -> DVec2 {
+    mesh.blocks.iter().find(|b| b.ply == ply).map_or(DVec2::NAN, |b| DVec3::from(b.fibre).xy())
 }
 
 /// The rows of the pull.
 struct Pull {
-    shear: Columns,
+    shear: Vec<Shear>,
+    zones: Vec<Zones>,
     rows: Vec<usize>,
     /// The last row before, and the last of all.
     before: usize,
@@ -126,16 +136,11 @@ struct Pull {
 }
 
 impl Pull {
-    fn column(&self, name: &str) -> Vec<f64> {
-        self.shear.numbers(name)
-    }
-
     /// `None`, as of the others, where no crossing lies well inside a zone.
     fn zones(&self) -> Option<String> {
-        let at = |zone: &str| self.column(&format!("zone_{zone}_angle_deg"))[self.last];
-        let [a, b, c] = ["a", "b", "c"].map(at);
-        let way = self.column("displacement_mm")[self.last];
-        let theory = self.column("theory_angle_deg")[self.last];
+        let zones = &self.zones[self.last];
+        let [a, b, c] = [zones.zone_a_angle_deg, zones.zone_b_angle_deg, zones.zone_c_angle_deg];
+        let (way, theory) = (self.shear[self.last].displacement_mm, zones.theory_angle_deg);
         let known = [a, b, c, theory].iter().all(|angle| angle.is_finite());
         known.then(|| format!(
             "Zones A / B / C have sheared by {a:.1} / {b:.1} / {c:.1}° at {way:.2} mm ({:.2} and {:.2} of C); without slip none, \
@@ -147,17 +152,16 @@ impl Pull {
 
     /// The effective angle of zone C beside Eq. 18.
     fn lag(&self) -> Option<String> {
-        let [effective, theory] = ["zone_c_angle_deg", "theory_angle_deg"].map(|name| self.column(name));
         let stated = STATED_DEG.iter().filter_map(|stated| {
-            let row = self.rows.iter().find(|&&row| theory[row] >= *stated)?;
-            Some(format!("{:.1} at {:.1}°", effective[*row], theory[*row]))
+            let zones = self.rows.iter().map(|row| &self.zones[*row]).find(|z| z.theory_angle_deg >= *stated)?;
+            Some(format!("{:.1} at {:.1}°", zones.zone_c_angle_deg, zones.theory_angle_deg))
         });
         let stated: Vec<String> = stated.collect();
         (!stated.is_empty()).then(|| format!("Effective angle in zone C where Eq. 18 has more: {}", stated.join(", ")))
     }
 
-    fn widths(&self, ply: &str) -> Option<String> {
-        let width = self.column(&format!("zone_c_{ply}_width_mm"));
+    fn widths(&self, ply: &str, width: fn(&Zones) -> f64) -> Option<String> {
+        let width: Vec<f64> = self.zones.iter().map(width).collect();
         let mut narrowest = width[self.before];
         let mut rise = 0.0f64;
         for &row in &self.rows {
@@ -171,14 +175,14 @@ impl Pull {
         ))
     }
 
-    fn gaps(&self, ply: &str) -> Option<String> {
-        let (gap, angle) = (self.column(&format!("zone_c_{ply}_gap_mm")), self.column("zone_c_angle_deg"));
+    fn gaps(&self, ply: &str, gap: fn(&Zones) -> f64) -> Option<String> {
+        let gap: Vec<f64> = self.zones.iter().map(gap).collect();
         let widest = self.rows.iter().copied().max_by(|&a, &b| gap[a].total_cmp(&gap[b])).unwrap_or(self.last);
         let known = [gap[self.before], gap[widest], gap[self.last]].iter().all(|gap| gap.is_finite());
         known.then(|| {
             format!(
                 "Gap of the {ply} in zone C: {:.3} mm before, largest {:.3} mm at {:.1}°, {:.3} mm at the end",
-                gap[self.before], gap[widest], angle[widest], gap[self.last]
+                gap[self.before], gap[widest], self.zones[widest].zone_c_angle_deg, gap[self.last]
             )
         })
     }

@@ -21,6 +21,7 @@ use crate::fabric;
 use crate::output::page::Page;
 use crate::output::results::Results;
 use crate::simulate::Simulation;
+use glam::DVec2;
 use zones::Strip;
 
 /// Frames whose crossings are mapped, the last one included.
@@ -68,5 +69,5 @@ impl Rig for Specimen {
 
 /// The strip between the clamps.
 fn strip(specimen: &Specimen) -> Strip {
-    Strip { centre: [0.0; 2], axis: [1.0, 0.0], length: specimen.length_mm, width: specimen.width_mm }
+    Strip { centre: DVec2::ZERO, axis: DVec2::X, length: specimen.length_mm, width: specimen.width_mm }
 }

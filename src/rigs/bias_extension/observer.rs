@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::kernel::record::{Record, Recorded};
 use crate::measure::yarns;
 use crate::mesh::frame::Frame;
-use crate::output::table::Table;
+use crate::output::appended::Appended;
 use crate::rigs::crossings::Crossed;
 use crate::rigs::observer::{Loading, Observer, Seen, Tables};
 use crate::settings::steps::Step;
@@ -230,8 +230,8 @@ impl Observer for Pulled {
         phase == "move" && self.last[0] > SETTLED * self.length
     }
 
-    fn tables(&mut self) -> Vec<&mut Table> {
-        self.crossings.iter_mut().flat_map(|crossed| &mut crossed.tables).collect()
+    fn tables(&mut self) -> Vec<&mut Appended> {
+        self.crossings.iter_mut().flat_map(Crossed::files).collect()
     }
 
     fn record(&mut self, record: &mut Record) {

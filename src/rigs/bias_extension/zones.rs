@@ -3,6 +3,7 @@
 
 use crate::measure::Spread;
 use crate::measure::crossings::Crossing;
+use glam::DVec2;
 
 /// Zone of a point in the reference state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -29,8 +30,8 @@ impl Zone {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strip {
     /// Centre, mm, and unit direction of the pull.
-    pub centre: [f64; 2],
-    pub axis: [f64; 2],
+    pub centre: DVec2,
+    pub axis: DVec2,
     /// Length between the clamps along the axis, and width, mm.
     pub length: f64,
     pub width: f64,
@@ -38,17 +39,17 @@ pub struct Strip {
 
 impl Strip {
     /// Zone of a point whose two yarns run along `yarns`.
-    pub fn zone(&self, point: [f64; 2], yarns: [[f64; 2]; 2]) -> Zone {
+    pub fn zone(&self, point: DVec2, yarns: [DVec2; 2]) -> Zone {
         let held = yarns.into_iter().filter(|&yarn| self.held(point, yarn)).count();
         [Zone::C, Zone::B, Zone::A][held]
     }
 
     /// Zone of a point at least `margin` (mm, along and across the pull) away from every other zone and from the edges.
-    pub fn core(&self, point: [f64; 2], yarns: [[f64; 2]; 2], margin: f64) -> Option<Zone> {
+    pub fn core(&self, point: DVec2, yarns: [DVec2; 2], margin: f64) -> Option<Zone> {
         let zone = self.zone(point, yarns);
-        let [ax, ay] = self.axis.map(|a| a * margin);
-        let around = [[ax, ay], [-ax, -ay], [-ay, ax], [ay, -ax]].map(|[x, y]| [point[0] + x, point[1] + y]);
-        let inside = |p: [f64; 2]| {
+        let along = self.axis * margin;
+        let around = [along, -along, along.perp(), -along.perp()].map(|way| point + way);
+        let inside = |p: DVec2| {
             let [along, across] = self.place(p);
             along.abs() <= 0.5 * self.length && across.abs() <= 0.5 * self.width && self.zone(p, yarns) == zone
         };
@@ -56,16 +57,15 @@ impl Strip {
     }
 
     /// Place along and across the pull, from the centre.
-    fn place(&self, point: [f64; 2]) -> [f64; 2] {
-        let [x, y] = [point[0] - self.centre[0], point[1] - self.centre[1]];
-        let [a, b] = self.axis;
-        [a * x + b * y, a * y - b * x]
+    fn place(&self, point: DVec2) -> [f64; 2] {
+        let way = point - self.centre;
+        [self.axis.dot(way), self.axis.perp_dot(way)]
     }
 
     /// Whether the straight yarn through a point meets a clamp.
-    fn held(&self, point: [f64; 2], yarn: [f64; 2]) -> bool {
+    fn held(&self, point: DVec2, yarn: DVec2) -> bool {
         let [along, across] = self.place(point);
-        let [c, s] = [self.axis[0] * yarn[0] + self.axis[1] * yarn[1], self.axis[0] * yarn[1] - self.axis[1] * yarn[0]];
+        let [c, s] = [self.axis.dot(yarn), self.axis.perp_dot(yarn)];
         let meets = |clamp: f64| (across + (clamp - along) * s / c).abs() <= 0.5 * self.width;
         meets(0.5 * self.length) || meets(-0.5 * self.length)
     }
@@ -120,17 +120,18 @@ impl Means {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
 
-    const DIAGONALS: [[f64; 2]; 2] = [[1.0, 1.0], [1.0, -1.0]];
+    const DIAGONALS: [DVec2; 2] = [DVec2::ONE, DVec2::new(1.0, -1.0)];
 
     #[test]
     fn areas_of_the_zones_are_those_of_the_three_zone_theory() {
-        let strip = Strip { centre: [0.0; 2], axis: [1.0, 0.0], length: 240.0, width: 80.0 };
+        let strip = Strip { centre: DVec2::ZERO, axis: DVec2::X, length: 240.0, width: 80.0 };
         let mut counts = [0; 3];
         for i in 0..480 {
             for j in 0..160 {
                 // no point lies on a border
-                let point = [-119.75 + 0.5 * f64::from(i), -39.9 + 0.5 * f64::from(j)];
+                let point = DVec2::new(-119.75 + 0.5 * f64::from(i), -39.9 + 0.5 * f64::from(j));
                 counts[strip.zone(point, DIAGONALS) as usize] += 1;
             }
         }
@@ -144,10 +145,10 @@ mod tests {
     #[test]
     fn means_are_those_of_the_crossings_of_each_zone() {
         let crossing = |angle: f64, gap: f64| Crossing {
-            position: [0.0; 3],
+            position: DVec3::ZERO,
             angle,
             direction: [0.1, -0.1],
-            slip: [0.3, 0.4],
+            slip: DVec2::new(0.3, 0.4),
             width: [4.0, 2.0],
             gap: [gap, f64::NAN],
         };
@@ -161,13 +162,10 @@ mod tests {
 
     #[test]
     fn a_turned_strip_has_the_same_zones_and_cores_stay_clear_of_borders() {
-        let turned = Strip { centre: [3.0, -2.0], axis: [0.6, 0.8], length: 240.0, width: 80.0 };
-        let turn = |[x, y]: [f64; 2]| [0.6 * x - 0.8 * y, 0.8 * x + 0.6 * y];
-        let yarns = DIAGONALS.map(turn);
-        let at = |p: [f64; 2]| {
-            let [x, y] = turn(p);
-            [x + 3.0, y - 2.0]
-        };
+        let (centre, axis) = (DVec2::new(3.0, -2.0), DVec2::new(0.6, 0.8));
+        let turned = Strip { centre, axis, length: 240.0, width: 80.0 };
+        let yarns = DIAGONALS.map(|yarn| axis.rotate(yarn));
+        let at = |p: [f64; 2]| centre + axis.rotate(p.into());
         let points =
             [([0.0, 0.0], Zone::C), ([110.0, 5.0], Zone::A), ([80.0, 30.0], Zone::B), ([-100.0, -39.0], Zone::B)];
         for (p, zone) in points {

@@ -7,11 +7,14 @@ use crate::measure::shear::{self, CellCurve};
 use crate::measure::yarns;
 use crate::mesh::Ply;
 use crate::mesh::frame::Frame;
-use crate::output::table::{STRESS, Table};
+use crate::output::appended::Appended;
+use crate::output::rows::Stress;
+use crate::output::table::Table;
 use crate::rigs::crossings::Crossed;
 use crate::rigs::observer::{Loading, Observer, Seen, Tables};
 use crate::settings::steps::Step;
 use crate::simulate::Simulation;
+use glam::DVec2;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -19,7 +22,7 @@ use std::path::Path;
 /// Angle after which the kinetic energy of shear is judged, degrees.
 const SETTLED_DEG: f64 = 2.0;
 /// Diagonal of the cell towards which positive shear turns its yarns.
-const DIAGONAL: [f64; 2] = [1.0, 1.0];
+const DIAGONAL: DVec2 = DVec2::ONE;
 /// Angles at which the last lines state F_nor, degrees, and the distance from them that counts.
 const STATED_DEG: [f64; 5] = [5.0, 15.0, 25.0, 35.0, 45.0];
 const NEAR_DEG: f64 = 1.0;
@@ -29,7 +32,7 @@ pub(super) struct Sheared {
     /// Reference area, mm².
     area: f64,
     force: CellCurve,
-    stress: Table,
+    stress: Table<Stress>,
     crossings: Option<Crossed>,
     /// Sizes of warp and weft in the real fabric, for the last lines.
     measured: [String; 2],
@@ -51,7 +54,7 @@ impl Sheared {
         Ok(Self {
             area: mesh.period.map_or(f64::NAN, |[x, y]| x * y),
             force: CellCurve::new(mesh),
-            stress: tables.open("stress.csv", STRESS)?,
+            stress: tables.open("stress.csv")?,
             crossings: Crossed::of(mesh, DIAGONAL, None, tables)?,
             measured: [&fabric.warp, &fabric.weft].map(measured),
             curve: Vec::new(),
@@ -126,10 +129,26 @@ impl Observer for Sheared {
             }
             self.missed[2] += 1.0;
         }
-        let stretches = simulation.stretch();
-        let membrane = shear::membrane_forces(in_plane(stress), middle, self.area);
-        let numbers = [time, degrees].into_iter().chain(stress.concat().into_iter().map(|p| p / self.area));
-        self.stress.numbers(&numbers.chain(stretches).chain(membrane).collect::<Vec<_>>())?;
+        let [weft_stretch, warp_stretch] = simulation.stretch();
+        let [weft_membrane, warp_membrane] = shear::membrane_forces(in_plane(stress), middle, self.area);
+        let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = stress.map(|row| row.map(|p| p / self.area));
+        self.stress.row(&Stress {
+            time_s: time,
+            shear_angle_deg: degrees,
+            p_xx_n_per_mm: xx,
+            p_xy_n_per_mm: xy,
+            p_xz_n_per_mm: xz,
+            p_yx_n_per_mm: yx,
+            p_yy_n_per_mm: yy,
+            p_yz_n_per_mm: yz,
+            p_zx_n_per_mm: zx,
+            p_zy_n_per_mm: zy,
+            p_zz_n_per_mm: zz,
+            weft_stretch,
+            warp_stretch,
+            weft_membrane_n_per_mm: weft_membrane,
+            warp_membrane_n_per_mm: warp_membrane,
+        })?;
         if let (Some(crossed), Some((frame, yarns))) = (&mut self.crossings, seen.yarns) {
             let crossings = crossed.measure(simulation.mesh(), frame, yarns)?;
             crossed.write_row([time, degrees, simulation.displacement()], &crossings, f64::NAN)?;
@@ -149,9 +168,9 @@ impl Observer for Sheared {
         phase == "shear" && simulation.load().angle.to_degrees().abs() > SETTLED_DEG
     }
 
-    fn tables(&mut self) -> Vec<&mut Table> {
-        let crossings = self.crossings.iter_mut().flat_map(|crossed| &mut crossed.tables);
-        std::iter::once(&mut self.stress).chain(crossings).collect()
+    fn tables(&mut self) -> Vec<&mut Appended> {
+        let crossings = self.crossings.iter_mut().flat_map(Crossed::files);
+        std::iter::once(&mut self.stress.file).chain(crossings).collect()
     }
 
     fn record(&mut self, record: &mut Record) {

@@ -9,6 +9,7 @@ use crate::case::suggest::advice;
 use crate::error::Result;
 use crate::rigs::check::{self, MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM};
 use crate::settings::steps::Step;
+use glam::DVec3;
 
 pub fn check(case: &Case, mesh: &InlineMesh, provenance: &Provenance) -> Result<()> {
     if case.fabric.is_some() {
@@ -87,15 +88,15 @@ fn hexes(nodes: &[[f64; 3]], elements: [usize; 3], path: &str, provenance: &Prov
         );
         return Err(provenance.error(&format!("{path}.nodes"), message));
     }
-    let node = |s: usize, c: usize, l: usize| nodes[(l * (columns + 1) + c) * (slices + 1) + s];
+    let node = |s: usize, c: usize, l: usize| DVec3::from(nodes[(l * (columns + 1) + c) * (slices + 1) + s]);
     for element in 0..slices * columns * layers {
         let [s, c, l] = [element % slices, element / slices % columns, element / (slices * columns)];
         for corner in 0..8 {
             let [i, j, k] = [corner & 1, corner >> 1 & 1, corner >> 2];
-            let along = difference(node(s + 1, c + j, l + k), node(s, c + j, l + k));
-            let across = difference(node(s + i, c + 1, l + k), node(s + i, c, l + k));
-            let up = difference(node(s + i, c + j, l + 1), node(s + i, c + j, l));
-            let volume = triple(along, across, up);
+            let along = node(s + 1, c + j, l + k) - node(s, c + j, l + k);
+            let across = node(s + i, c + 1, l + k) - node(s + i, c, l + k);
+            let up = node(s + i, c + j, l + 1) - node(s + i, c + j, l);
+            let volume = along.dot(across.cross(up));
             if volume <= TOLERANCE_MM.powi(3) {
                 let message = format!(
                     "the hexahedron of slice {s}, column {c}, layer {l} is inside out or flat (volume {volume:.3e} mm³ at \
@@ -110,7 +111,7 @@ fn hexes(nodes: &[[f64; 3]], elements: [usize; 3], path: &str, provenance: &Prov
 
 fn thread(thread: &InlineThread, path: &str, provenance: &Provenance) -> Result<()> {
     for (i, node) in thread.nodes.iter().enumerate() {
-        if i > 0 && difference(*node, thread.nodes[i - 1]).iter().all(|d| d.abs() < TOLERANCE_MM) {
+        if i > 0 && (DVec3::from(*node) - DVec3::from(thread.nodes[i - 1])).abs().max_element() < TOLERANCE_MM {
             let message = format!("{node:?} repeats the node before it, a beam needs a length: remove one");
             return Err(provenance.error(&format!("{path}.nodes.{i}"), message));
         }
@@ -206,12 +207,4 @@ fn steps(case: &Case, mesh: &InlineMesh, provenance: &Provenance) -> Result<()> 
         return Err(provenance.error(&path, "is never applied: add a pretension step"));
     }
     Ok(())
-}
-
-fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn triple(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> f64 {
-    a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
 }

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::output::file;
 use crate::output::page::Page;
 use crate::output::scatter::{Mark, Scatter};
-use crate::output::table::{Cell, Table};
+use crate::output::table::{Named, text as number};
 use crate::study::difference::Difference;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -57,33 +57,20 @@ impl Report<'_> {
         header.extend(names.iter().map(|name| format!("change_{name}")));
         header.extend(names.first().map(|name| format!("error_rms_{name}")));
         header.extend(["front", "flags"].map(String::from));
-        let header: Vec<&str> = header.iter().map(String::as_str).collect();
-        let mut table = Table::create(path, &header)?;
-        for (number, row) in f.rows.iter().enumerate() {
+        let mut table = Named::create(path, &header)?;
+        for (at, row) in f.rows.iter().enumerate() {
             let claims = |of: &dyn Fn(usize) -> Option<(f64, bool)>| -> Vec<String> {
                 (0..names.len()).map(|k| of(k).map_or("NaN".into(), exact)).collect()
             };
-            let mut texts = claims(&|k| f.claim(row, k));
-            texts.extend(claims(&|k| f.effect(row, k)));
-            let flags = row.ran.flags.replace([',', '"'], " ");
-            let mut cells: Vec<Cell> = vec![(number as f64).into(), row.point.label.into(), row.point.knob.into()];
-            cells.push(row.ran.ended.as_str().into());
-            cells.extend(
-                [
-                    row.number("steps"),
-                    row.ran.seconds.wall,
-                    row.ran.seconds.cpu,
-                    row.time,
-                    row.number("worst_energy_balance"),
-                ]
-                .map(Cell::from),
-            );
-            cells.extend(texts.iter().map(|text| Cell::Name(text)));
+            let [wall, cpu] = [row.ran.seconds.wall, row.ran.seconds.cpu];
+            let mut cells = vec![at.to_string(), row.point.label.into(), row.point.knob.into(), row.ran.ended.clone()];
+            cells.extend([row.number("steps"), wall, cpu, row.time, row.number("worst_energy_balance")].map(number));
+            cells.extend(claims(&|k| f.claim(row, k)));
+            cells.extend(claims(&|k| f.effect(row, k)));
             if !names.is_empty() {
-                cells.push(row.errors[0].map_or(f64::NAN, |d| d.rms).into());
+                cells.push(number(row.errors[0].map_or(f64::NAN, |d| d.rms)));
             }
-            cells.push(if row.front { "yes" } else { "no" }.into());
-            cells.push(flags.as_str().into());
+            cells.extend([if row.front { "yes" } else { "no" }.into(), row.ran.flags.clone()]);
             table.row(&cells)?;
         }
         Ok(())
