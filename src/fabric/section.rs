@@ -1,14 +1,9 @@
 //! Cross-section of a yarn: an ellipse with both tips cut off (Eq. 1 of the paper). Coordinates u across the width and
 //! v through the thickness, from the centre, mm.
 
+use crate::kernel::math::smooth;
 use libm::{acos, asin, atan2, cos, sin};
 use std::f64::consts::PI;
-
-/// Smooth step from 0 to 1 with flat ends: t²(3 − 2t), constant outside.
-pub fn smooth(t: f64) -> f64 {
-    let t = t.clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
 
 /// A truncated ellipse.
 #[derive(Debug, Clone, Copy, PartialEq)]

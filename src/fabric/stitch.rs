@@ -2,9 +2,10 @@
 //! an underlap across the warp yarn, on the warp face. One lap is generated; the next is its mirror image.
 
 use super::polyline::Polyline;
-use super::section::{Section, smooth};
+use super::section::Section;
 use crate::case::fabric::{Fabric, Lap, Stitch, Yarn};
 use crate::error::{Error, Result};
+use crate::kernel::math::smooth;
 use crate::mesh::vector::{Vector, between, norm, sub};
 use crate::mesh::{Part, Thread, quality};
 use libm::{cos, sin};

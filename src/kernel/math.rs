@@ -79,6 +79,12 @@ pub fn asinh_ratio<L: Lane>(u: L) -> L {
     L::select(u.lt(L::new(0.01)), series, far)
 }
 
+/// Smooth step from 0 to 1 with flat ends: t²(3 − 2t), constant outside.
+pub fn smooth(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

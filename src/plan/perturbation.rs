@@ -7,7 +7,7 @@
 //! prescribed stay, and a thread beside them reaches its displacement within 10 mm.
 
 use super::conditions::Conditions;
-use crate::fabric::section::smooth;
+use crate::kernel::math::smooth;
 use crate::kernel::position::quanta;
 use crate::mesh::vector::{Vector, between, dot, norm, scale, sub};
 use crate::mesh::{Block, Mesh, Thread};
