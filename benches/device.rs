@@ -56,7 +56,7 @@ fn main() {
         let old = timed.iter().find(|(n, _)| *n == name).map_or(0.0, |(_, t)| *t);
         let spent = (time - old) / steps as f64;
         sum += spent;
-        let stages = plan.step.iter().filter(|s| s.name == name && s.count > 0);
+        let stages = plan.step.iter().filter(|s| s.name() == name && !s.items().is_empty());
         let floor = stages.map(|s| floor(&sheet, s, rates.bytes, rates.operations)).fold(0.0, |a, b| a + b);
         // only the stages of every step have one
         let floor = (floor > 0.0).then(|| format!("{:12.2} {:10.0} %", 1e6 * floor, 100.0 * floor / spent));
@@ -71,10 +71,11 @@ fn go(sheet: &mut Simulation, until: f64) {
 
 /// The least time of a stage, s: all its buffers moved once, or its operations at the best rate, whichever takes longer.
 fn floor(sheet: &Simulation, stage: &Stage, bytes_per_s: f64, operations_per_s: f64) -> f64 {
-    let buffers: HashSet<usize> = stage.reads.iter().chain(stage.writes.iter().map(|(b, _)| b)).map(|b| b.0).collect();
-    let written: usize = stage.writes.iter().map(|(b, _)| sheet.model.plan.buffers[b.0].len).sum();
+    let buffers: HashSet<usize> =
+        stage.reads().iter().chain(stage.writes().iter().map(|(b, _)| b)).map(|b| b.number()).collect();
+    let written: usize = stage.writes().iter().map(|(b, _)| sheet.model.plan.describe(*b).len).sum();
     let bytes = 4 * (buffers.iter().map(|b| sheet.model.plan.buffers[*b].len).sum::<usize>() + written);
-    let invocations = stage.count * stage.kernel.shader.share.invocations();
+    let invocations = stage.items().len() * stage.kernel().shader.share.invocations();
     let operations = operations(stage) * invocations as f64;
     (bytes as f64 / bytes_per_s).max(operations / operations_per_s)
 }

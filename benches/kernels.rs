@@ -11,7 +11,6 @@ use std::time::{Duration, Instant};
 use tricot::backend::{Backend, cpu::Cpu};
 use tricot::elements::LANES;
 use tricot::elements::block::Header;
-use tricot::kernel::buffer::Buffer;
 use tricot::kernel::row::Row;
 use tricot::kernel::stage::Stage;
 use tricot::rigs::read::read;
@@ -41,7 +40,7 @@ fn main() {
         .configure_from_args();
     let plan = cell.model.plan.clone();
     for stage in &plan.step {
-        bench(&mut criterion, stage.name, &cell, &config, std::slice::from_ref(stage), row);
+        bench(&mut criterion, stage.name(), &cell, &config, std::slice::from_ref(stage), row);
     }
     for (name, stages) in
         [("all of search", &plan.search), ("all of diagnose", &plan.diagnose), ("all of collect", &plan.collect)]
@@ -67,7 +66,7 @@ fn advance(cell: &mut Simulation, steps: u64) -> u64 {
 /// A backend in the state of a simulation.
 fn copy(cell: &Simulation, config: &BackendConfig) -> Cpu<f32> {
     let mut backend = Cpu::new(&cell.model.plan.buffers, config.threads, config.isa);
-    for buffer in (0..cell.model.plan.buffers.len()).map(Buffer) {
+    for buffer in cell.model.plan.all() {
         backend.set_bytes(buffer, &cell.backend().bytes(buffer));
     }
     backend
@@ -96,13 +95,13 @@ fn bench(
 fn bare(cell: &Simulation, config: &BackendConfig, row: Row<f64>) -> f64 {
     const ROUNDS: usize = 200;
     let model = &cell.model;
-    let stage = model.plan.step.iter().find(|s| s.name == "hex8").expect("the cell has hexahedra");
-    let headers = cell.backend().uints(stage.reads[0]);
+    let stage = model.plan.step.iter().find(|s| s.name() == "hex8").expect("the cell has hexahedra");
+    let headers = cell.backend().uints(stage.reads()[0]);
     let headers: Vec<Header> = bytemuck::cast_slice(&headers).to_vec();
     // blocks of consecutive nodes come first
     let count = headers.iter().take_while(|h| h.contiguous == 1).count().min(BARE_BLOCKS);
     assert!(count > 0, "no block has consecutive nodes");
-    let stage = Stage { first: 0, count, grain: count, ..stage.clone() };
+    let stage = stage.beginning(count);
     let mut backend = copy(cell, config);
     let rows = vec![row; ROUNDS];
     let best = (0..12).map(|_| {
@@ -139,7 +138,7 @@ fn report(cell: &mut Simulation, bare: f64) {
     }
     println!("{:<24} {:>8.1}   of {:.1} us wall", "all stages", 1e6 * total, 1e6 * wall);
     let of = |chosen: &dyn Fn(&str) -> bool| spent.iter().filter(|(n, _)| chosen(n)).map(|(_, t)| t).sum::<f64>();
-    let searching: Vec<&str> = cell.model.plan.search.iter().map(|s| s.name).collect();
+    let searching: Vec<&str> = cell.model.plan.search.iter().map(|s| s.name()).collect();
     let search = of(&|n| searching.contains(&n));
     let forces = of(&|n| n.ends_with(" contact"));
     println!(

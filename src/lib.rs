@@ -35,7 +35,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`error`] | the one error type: every message names its culprit |
-//! | [`kernel`] | what backends share: lanes, elementary functions, positions in quanta, buffers, stages, the text of shaders |
+//! | [`kernel`] | what backends share: lanes, elementary functions, positions in quanta, buffers, interfaces of kernels, stages, the text of shaders |
 //! | [`settings`] | effects, load steps, integration, laws: plain structs with their JSON form |
 //! | [`mesh`] | nodes, blocks of hexahedra, threads, frames (deformed states), surfaces, quality |
 //! | [`materials`] | constitutive laws: energy, first Piola–Kirchhoff stress, stiffness |
@@ -66,6 +66,8 @@
 //! - **A material**: a file in `materials` with `impl Material` and its twin under `shaders`, an arm in `materials::Law` and in
 //!   [`settings::material::Material`]. The tests of `materials` compare its stress with differences of its energy.
 //! - **An element**: a kernel in `elements` and its twin, its tables and a stage in `plan`, its slots in [`dynamics::assemble`].
+//! - **A buffer or a constant of a kernel**: a slot among its `SLOTS`, which the plan binds by name, or a constant among those of its
+//!   shader. The twin gets both from there, see [`kernel::interface`].
 //! - **A contact law**: beside `contact::friction`; it sees one pair with its state and returns a force.
 //! - **An effect**: a flag in [`plan::Active`] that says what in a case calls for it, a const flag of the kernels it changes and the same
 //!   name for `#if` in their twins, a name and how to turn it off in [`run::effects`], a scene with and without it in `tests/physics/effects.rs`.

@@ -4,23 +4,12 @@
 #include "dynamics/integrate"
 
 #if ROOT
-// Node and mask of components, 2 numbers a condition.
-@group(1) @binding(0) var<storage, read> nodes: array<u32>;
-
 #if prescribed
 struct Params {
     first_thread: u32,
 }
 
 @group(2) @binding(1) var<uniform> params: Params;
-
-@group(1) @binding(1) var<storage, read> targets: array<f32>;
-@group(1) @binding(2) var<storage, read> velocity: array<f32>;
-@group(1) @binding(3) var<storage, read> mass: array<f32>;
-@group(1) @binding(4) var<storage, read_write> acceleration: array<f32>;
-@group(1) @binding(5) var<storage, read_write> inverse_mass: array<f32>;
-@group(1) @binding(6) var<storage, read_write> work: array<f32>;
-@group(1) @binding(7) var<storage, read_write> reactions: array<f32>;
 
 // Replaces accelerations of prescribed components, before fibre lines see them.
 fn prescribed(item: u32) {
@@ -60,8 +49,6 @@ fn prescribed(item: u32) {
 #endif
 
 #if hold
-@group(1) @binding(1) var<storage, read_write> correction: array<f32>;
-
 // Takes back what fibre lines did to prescribed components.
 fn hold(item: u32) {
     let plane = arrayLength(&correction) / 3u;

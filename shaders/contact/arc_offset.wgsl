@@ -4,15 +4,6 @@
 #include "contact/mod"
 #include "elements/beam2"
 
-// Integers of a beam in `neighbours`: the beams before and behind it, its thread, the image in which the first beam of a closed thread
-// follows the last.
-const NEIGHBOURS: u32 = 5u;
-// Numbers of a beam in `shares`: four shares of vectors in the shifts of its nodes; arc length of its middle, its length, length of a
-// closed thread, mm.
-const SHARES_OF: u32 = 7u;
-// Where the arc length is.
-const ARC: u32 = 4u;
-
 // A piece of the line: from the first node of its beam to both its ends, in the reference and now, mm.
 struct Piece {
     rest: array<vec3<f32>, 2>,
@@ -20,7 +11,7 @@ struct Piece {
 }
 
 fn shares_of(beam: u32) -> vec4<f32> {
-    let at = SHARES_OF * beam;
+    let at = SHARES * beam;
     return vec4<f32>(shares[at], shares[at + 1u], shares[at + 2u], shares[at + 3u]);
 }
 
@@ -44,8 +35,8 @@ fn piece(beam: u32) -> Piece {
 // Whether two beams are the same thread here and closer along it than `arc` after so many turns of a closed thread.
 fn are_near_after(turns: i32, a: u32, b: u32, image: vec2<i32>, arc: f32) -> bool {
     let wrap = vec2<i32>(i32(neighbours[NEIGHBOURS * a + 3u]), i32(neighbours[NEIGHBOURS * a + 4u]));
-    let p = SHARES_OF * a + ARC;
-    let q = SHARES_OF * b + ARC;
+    let p = SHARES * a + ARC;
+    let q = SHARES * b + ARC;
     let reach = arc + 0.5 * (shares[p + 1u] + shares[q + 1u]);
     return all(wrap * turns == image) && abs(shares[q] - shares[p] + f32(turns) * shares[p + 2u]) < reach;
 }

@@ -8,25 +8,6 @@
 #include "contact/grid"
 
 #if ROOT
-@group(1) @binding(0) var<storage, read> carriers: array<u32>;
-@group(1) @binding(1) var<storage, read> nodes: array<u32>;
-@group(1) @binding(2) var<storage, read> points: array<f32>;
-@group(1) @binding(3) var<storage, read> slabs: array<u32>;
-@group(1) @binding(4) var<storage, read> faces: array<u32>;
-@group(1) @binding(5) var<storage, read> reference: array<i32>;
-@group(1) @binding(6) var<storage, read> quanta: array<i32>;
-@group(1) @binding(7) var<storage, read> remainder: array<f32>;
-@group(1) @binding(8) var<storage, read> counts: array<u32>;
-@group(1) @binding(9) var<storage, read> lists: array<u32>;
-@group(1) @binding(10) var<storage, read> boxes: array<f32>;
-@group(1) @binding(11) var<storage, read> before: array<i32>;
-@group(1) @binding(12) var<storage, read_write> near: array<u32>;
-@group(1) @binding(13) var<storage, read_write> found_when: array<u32>;
-@group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
-
-// Integers of a carrier: its first point, how many it has, and its own body, or EMPTY for a thread.
-const CARRIER: u32 = 3u;
-
 // Where the points of a carrier are, see the twin.
 struct Place {
     low: vec3<f32>,

@@ -2,8 +2,6 @@
 
 #if clear
 #if ROOT
-@group(1) @binding(0) var<storage, read_write> counts: array<u32>;
-
 fn clear(cell: u32) {
     counts[cell] = 0u;
 }
@@ -22,18 +20,6 @@ fn clear(cell: u32) {
 #if fill_beams
 #include "contact/arc_offset"
 #endif
-
-// Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm, half sizes in the plane, mm (2); then
-// least (3) and greatest motion (3) of its nodes since everything was searched, quanta.
-const BOX: u32 = 12u;
-// Where motion starts in a box.
-const MOTION: u32 = 6u;
-// Largest motion that a box tells of, quanta.
-const MOST_MOTION: i32 = 16777216;
-// Integers of a slab: its first face, and how many follow each other.
-const SLAB: u32 = 2u;
-// More than rounding moves a place in the plane, mm: an item must not be in too few cells.
-const ROUNDING: f32 = 1e-4;
 
 // The in-plane inverse of F̄, and a vector in the pulled-back plane.
 struct Inverse {
@@ -131,27 +117,6 @@ fn has_moved(item: u32, other: Motion, apart: f32) -> bool {
 #endif
 
 #if ROOT
-@group(1) @binding(0) var<storage, read> reference: array<i32>;
-@group(1) @binding(1) var<storage, read> quanta: array<i32>;
-@group(1) @binding(2) var<storage, read> remainder: array<f32>;
-#if fill_slabs
-@group(1) @binding(3) var<storage, read> slabs: array<u32>;
-@group(1) @binding(4) var<storage, read> faces: array<u32>;
-@group(1) @binding(5) var<storage, read> before: array<i32>;
-const WRITES: u32 = 6u;
-#else
-@group(1) @binding(3) var<storage, read> ends: array<u32>;
-@group(1) @binding(4) var<storage, read> beams: array<f32>;
-@group(1) @binding(5) var<storage, read> neighbours: array<u32>;
-@group(1) @binding(6) var<storage, read> shares: array<f32>;
-@group(1) @binding(7) var<storage, read> before: array<i32>;
-const WRITES: u32 = 8u;
-#endif
-@group(1) @binding(WRITES) var<storage, read_write> counts: array<atomic<u32>>;
-@group(1) @binding(WRITES + 1u) var<storage, read_write> lists: array<u32>;
-@group(1) @binding(WRITES + 2u) var<storage, read_write> boxes: array<f32>;
-@group(1) @binding(WRITES + 3u) var<storage, read_write> status: array<atomic<u32>>;
-
 // The box of an item, from its first node, and the motion of its nodes.
 struct Bounds {
     low: vec3<f32>,

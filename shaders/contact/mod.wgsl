@@ -1,21 +1,6 @@
 // What all contact stages share: parameters, places and flags of the status buffer, keys of candidates, integer sums of forces.
 // With STATUS `status` is bound, with PAIRS also `forces` and `stiffness`; PARAMS asks for the parameters.
 
-const FLAGS: u32 = 0u;
-const TRAVEL: u32 = 1u;
-const PENETRATION: u32 = 2u;
-const CONTACT_RATE: u32 = 5u;
-const TOUCHING: u32 = 6u;
-const SPEED: u32 = 9u;
-const CULPRIT: u32 = 10u;
-const SEARCHED: u32 = 11u;
-
-const CELL_FULL: u32 = 1u;
-const SLOTS_FULL: u32 = 2u;
-const FORCE_RANGE: u32 = 4u;
-const NOT_FINITE: u32 = 8u;
-const OUT_OF_RANGE: u32 = 16u;
-
 // Whether a number is neither infinite nor not a number; by its bits, since compilers may assume that it is.
 fn is_finite(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
@@ -65,14 +50,6 @@ fn bound(count: u32, most: u32) -> u32 {
     return min(count, most);
 }
 
-// When candidates were found, see the twin.
-const WITH_ALL: u32 = 0u;
-const SINCE: u32 = 1u;
-const NEVER: u32 = 2u;
-
-// No candidate in a slot.
-const EMPTY: u32 = 0xffffffffu;
-
 // What a key stands for.
 struct Keyed {
     body: u32,
@@ -103,7 +80,7 @@ fn add_pair(push: vec3<f32>, to: Weighted, back_to: Weighted) {
     let plane = arrayLength(&forces) / 3u;
     for (var k = 0u; k < 3u; k++) {
         let force_quanta = push[k] / params.force_quantum;
-        if !is_finite(force_quanta) || abs(force_quanta) >= 134217728.0 {
+        if !is_finite(force_quanta) || abs(force_quanta) >= MOST_QUANTA {
             atomicOr(&status[FLAGS], FORCE_RANGE);
             atomicStore(&status[CULPRIT], to.nodes[0]);
             return;

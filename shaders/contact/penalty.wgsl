@@ -14,48 +14,6 @@
 #endif
 
 #if ROOT
-@group(1) @binding(0) var<storage, read> nodes: array<u32>;
-@group(1) @binding(1) var<storage, read> points: array<f32>;
-@group(1) @binding(2) var<storage, read> faces: array<u32>;
-@group(1) @binding(3) var<storage, read> near: array<u32>;
-@group(1) @binding(4) var<storage, read> reference: array<i32>;
-@group(1) @binding(5) var<storage, read> quanta: array<i32>;
-@group(1) @binding(6) var<storage, read> remainder: array<f32>;
-@group(1) @binding(7) var<storage, read> velocity: array<f32>;
-@group(1) @binding(8) var<storage, read> mass: array<f32>;
-@group(1) @binding(9) var<storage, read_write> gaps: array<f32>;
-@group(1) @binding(10) var<storage, read_write> keys: array<u32>;
-@group(1) @binding(11) var<storage, read_write> touches: array<f32>;
-@group(1) @binding(12) var<storage, read_write> sums: array<f32>;
-@group(1) @binding(13) var<storage, read_write> forces: array<atomic<i32>>;
-@group(1) @binding(14) var<storage, read_write> stiffness: array<atomic<i32>>;
-@group(1) @binding(15) var<storage, read_write> status: array<atomic<u32>>;
-
-// Numbers before the gaps of a point.
-const LEAST: u32 = 0u;
-const CLOSED: u32 = 1u;
-const INNER: u32 = 2u;
-const GAPS: u32 = 3u;
-// More than rounding moves a gap, mm.
-const GAP_ROUNDING: f32 = 1e-6;
-// Share of their distances by which two places that are equally near may differ.
-const TIE: f32 = 1e-4;
-// Numbers of a touch.
-const NORMAL: u32 = 0u;
-const DAMPED: u32 = 1u;
-const ELASTIC: u32 = 2u;
-#if FRICTION
-const TOUCH: u32 = ELASTIC + 3u;
-#else
-const TOUCH: u32 = ELASTIC;
-#endif
-// Place of the kind in the status.
-#if THREAD
-const KIND: u32 = 0u;
-#else
-const KIND: u32 = 1u;
-#endif
-
 // How much farther than what is nearest, at a `distance`, a face may be and still count as equally near, with room, mm.
 fn margin(distance: f32) -> f32 {
     return 2.0 * TIE * distance + GAP_ROUNDING;
@@ -213,7 +171,7 @@ fn pull(item: u32, around: Corners, pulled: array<vec3<f32>, 4>) {
     let plane = arrayLength(&forces) / 3u;
     let sum = ((pulls[0] + pulls[1]) + (pulls[2] + pulls[3])) / params.force_quantum;
     let fits = is_finite(sum.x) && is_finite(sum.y) && is_finite(sum.z);
-    if !fits || any(abs(sum) >= vec3<f32>(134217728.0)) {
+    if !fits || any(abs(sum) >= vec3<f32>(MOST_QUANTA)) {
         atomicOr(&status[FLAGS], FORCE_RANGE);
         atomicStore(&status[CULPRIT], around.nodes[0]);
         return;

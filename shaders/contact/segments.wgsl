@@ -29,9 +29,6 @@ struct Between {
     slope: vec3<f32>,
 }
 
-// Least |dq/ds| of partners and least curvature of q over R², so that divisions are of numbers.
-const STRAIGHT: f32 = 1e-20;
-
 fn unit(x: f32) -> f32 {
     return min(max(x, 0.0), 1.0);
 }

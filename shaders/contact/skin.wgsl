@@ -8,13 +8,7 @@
 #include "contact/mod"
 
 #if ROOT
-@group(1) @binding(0) var<storage, read> quanta: array<i32>;
-@group(1) @binding(1) var<storage, read> remainder: array<f32>;
-
 #if remember
-@group(1) @binding(2) var<storage, read_write> search_quanta: array<i32>;
-@group(1) @binding(3) var<storage, read_write> search_remainder: array<f32>;
-
 fn remember(node: u32) {
     let plane = arrayLength(&remainder) / 3u;
     for (var k = 0u; k < 3u; k++) {
@@ -25,15 +19,6 @@ fn remember(node: u32) {
 #endif
 
 #if travel
-@group(1) @binding(2) var<storage, read> velocity: array<f32>;
-#if CONTACT
-@group(1) @binding(3) var<storage, read> search_quanta: array<i32>;
-@group(1) @binding(4) var<storage, read> search_remainder: array<f32>;
-@group(1) @binding(5) var<storage, read_write> status: array<atomic<u32>>;
-#else
-@group(1) @binding(3) var<storage, read_write> status: array<atomic<u32>>;
-#endif
-
 fn travel(node: u32) {
     let plane = arrayLength(&remainder) / 3u;
     var far = 0.0;

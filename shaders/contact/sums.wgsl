@@ -1,23 +1,6 @@
 // What contact sums up for each point and each beam: energies, slip, and the share of the homogenised stress.
 // What includes this binds `sums`.
 
-// Sums of a point or a beam, and where the stress starts among them.
-const SUM_ENERGY: u32 = 0u;
-const SUM_DAMPING: u32 = 1u;
-const SUM_RADIUS: u32 = 2u;
-#if FRICTION
-const SUM_FRICTION: u32 = 3u;
-const SUM_SLIP: u32 = 4u;
-const SUM_VIRIAL: u32 = 5u;
-#else
-const SUM_VIRIAL: u32 = 3u;
-#endif
-#if PERIODIC
-const SUMS: u32 = SUM_VIRIAL + 9u;
-#else
-const SUMS: u32 = SUM_VIRIAL;
-#endif
-
 // Adds to a sum of an item.
 fn add_sum(item: u32, sum: u32, value: f32) {
     sums[SUMS * item + sum] = sums[SUMS * item + sum] + value;

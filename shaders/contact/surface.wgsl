@@ -8,9 +8,6 @@
 #define PARAMS
 #include "contact/mod"
 
-// Integers of a face: four coded corners, counter-clockwise seen from outside; its marks.
-const FACE: u32 = 5u;
-
 // A node in an image.
 struct Imaged {
     node: u32,
@@ -89,18 +86,6 @@ fn corners(face: u32, image: vec2<i32>, base: u32, aside: Offset) -> Corners {
 #endif
 
 #if POINTS
-// Integers and numbers of a point, and integers before the entries of a list and before the keys of a point, see the twins of
-// this and of `contact/candidates`.
-const CARRIED: u32 = 5u;
-const POINT: u32 = 6u;
-const MADE: u32 = 1u;
-// Nodes that carry a point.
-#if THREAD
-const CARRIED_BY: u32 = 4u;
-#else
-const CARRIED_BY: u32 = 1u;
-#endif
-
 // A node that carries a point.
 fn carried_by(item: u32, a: u32) -> u32 {
     return of_coded(nodes[CARRIED * item + a]).node;

@@ -18,14 +18,6 @@
 #include "contact/segments"
 
 #if ROOT
-@group(1) @binding(0) var<storage, read> ends: array<u32>;
-@group(1) @binding(1) var<storage, read> beams: array<f32>;
-@group(1) @binding(2) var<storage, read> reference: array<i32>;
-@group(1) @binding(3) var<storage, read> quanta: array<i32>;
-@group(1) @binding(4) var<storage, read> remainder: array<f32>;
-@group(1) @binding(5) var<storage, read> neighbours: array<u32>;
-@group(1) @binding(6) var<storage, read> shares: array<f32>;
-
 // Two pieces in the reference and now.
 struct Pieces {
     rest: Segments,
@@ -44,14 +36,6 @@ fn pieces(a: u32, own: Piece, b: u32, image: vec2<i32>) -> Pieces {
 }
 
 #if pairs
-@group(1) @binding(7) var<storage, read> counts: array<u32>;
-@group(1) @binding(8) var<storage, read> lists: array<u32>;
-@group(1) @binding(9) var<storage, read> boxes: array<f32>;
-@group(1) @binding(10) var<storage, read_write> keys: array<u32>;
-@group(1) @binding(11) var<storage, read_write> states: array<f32>;
-@group(1) @binding(12) var<storage, read_write> found_when: array<u32>;
-@group(1) @binding(13) var<storage, read_write> status: array<atomic<u32>>;
-
 // Cells from the first to the last along x and y.
 struct Cells {
     x: vec2<i32>,
@@ -208,24 +192,6 @@ fn pairs(beam: u32) {
 #endif
 
 #if force
-// Numbers of a slot.
-#if FRICTION
-const SLOT_STATE: u32 = 4u;
-#else
-const SLOT_STATE: u32 = 1u;
-#endif
-@group(1) @binding(7) var<storage, read> velocity: array<f32>;
-@group(1) @binding(8) var<storage, read> mass: array<f32>;
-@group(1) @binding(9) var<storage, read_write> keys: array<u32>;
-@group(1) @binding(10) var<storage, read_write> states: array<f32>;
-@group(1) @binding(11) var<storage, read_write> sums: array<f32>;
-@group(1) @binding(12) var<storage, read_write> forces: array<atomic<i32>>;
-@group(1) @binding(13) var<storage, read_write> stiffness: array<atomic<i32>>;
-@group(1) @binding(14) var<storage, read_write> status: array<atomic<u32>>;
-
-// Share of a beam below which the length that touches is not divided by.
-const LEAST: f32 = 1e-6;
-
 // Two beams that touch: their nodes and weights, the penalty times their lengths, N/mm, and their pieces at rest.
 struct Pair {
     nodes: array<vec4<u32>, 2>,
@@ -365,7 +331,7 @@ fn resist(beam: u32, slot: u32, pair: Pair, pressed: f32, push: ptr<function, Pu
 
 // Whether components of a force fit their integers; else names the node.
 fn is_in_range(force_quanta: vec3<f32>, node: u32) -> bool {
-    let fits = all(abs(force_quanta) < vec3<f32>(134217728.0));
+    let fits = all(abs(force_quanta) < vec3<f32>(MOST_QUANTA));
     if !fits || !(is_finite(force_quanta.x) && is_finite(force_quanta.y) && is_finite(force_quanta.z)) {
         atomicOr(&status[FLAGS], FORCE_RANGE);
         atomicStore(&status[CULPRIT], node);

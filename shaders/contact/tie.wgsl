@@ -7,21 +7,7 @@
 #define PAIRS
 #include "contact/mod"
 
-// Nodes of a tie: the one that is held, and the corners of the face that holds it.
-const NODES: u32 = 5u;
-// Numbers of a tie: weights of the corners; stiffness, N/mm.
-const VALUES: u32 = 5u;
-
 #if ROOT
-@group(1) @binding(0) var<storage, read> ties: array<u32>;
-@group(1) @binding(1) var<storage, read> values: array<f32>;
-@group(1) @binding(2) var<storage, read> quanta: array<i32>;
-@group(1) @binding(3) var<storage, read> remainder: array<f32>;
-@group(1) @binding(4) var<storage, read_write> energies: array<f32>;
-@group(1) @binding(5) var<storage, read_write> forces: array<atomic<i32>>;
-@group(1) @binding(6) var<storage, read_write> stiffness: array<atomic<i32>>;
-@group(1) @binding(7) var<storage, read_write> status: array<atomic<u32>>;
-
 // Forces of ties.
 fn tie(item: u32) {
     let n = NODES * item;

@@ -1,18 +1,6 @@
 // Accelerations: each node gathers its corner slots in a fixed order, adds contact and its weight, and divides by its mass.
 
 #include "kernel/row"
-#include "elements/mod"
-
-// Corner slots a solid node gathers.
-const SOLID: u32 = 8u;
-// Slots a thread node gathers.
-const THREAD: u32 = 2u;
-#if BENDING
-// And with bending.
-const BENT: u32 = 3u;
-#endif
-// Nothing to gather.
-const NONE: u32 = 0xffffffffu;
 
 #if ROOT
 #if CONTACT
@@ -37,41 +25,7 @@ struct Params {
 
 @group(2) @binding(1) var<uniform> params: Params;
 
-@group(1) @binding(0) var<storage, read> solid_slots: array<u32>;
-@group(1) @binding(1) var<storage, read> hex_force: array<f32>;
-@group(1) @binding(2) var<storage, read> thread_slots: array<u32>;
-@group(1) @binding(3) var<storage, read> beam_force: array<f32>;
-@group(1) @binding(4) var<storage, read> mass: array<f32>;
-#if BENDING
-@group(1) @binding(5) var<storage, read> bend_slots: array<u32>;
-@group(1) @binding(6) var<storage, read> bend_force: array<f32>;
-const READS: u32 = 7u;
-#else
-const READS: u32 = 5u;
-#endif
-#if MASS_ADDED
-@group(1) @binding(READS) var<storage, read> element_stiffness: array<f32>;
-const WEIGHED: u32 = READS + 1u;
-#else
-const WEIGHED: u32 = READS;
-#endif
-#if GRAVITY
-@group(1) @binding(WEIGHED) var<storage, read> true_mass: array<f32>;
-const WRITES: u32 = WEIGHED + 1u;
-#else
-const WRITES: u32 = WEIGHED;
-#endif
-@group(1) @binding(WRITES) var<storage, read_write> acceleration: array<f32>;
-@group(1) @binding(WRITES + 1u) var<storage, read_write> inverse_mass: array<f32>;
 #if CONTACT
-@group(1) @binding(WRITES + 2u) var<storage, read_write> contact_force: array<i32>;
-@group(1) @binding(WRITES + 3u) var<storage, read_write> contact_stiffness: array<i32>;
-#if MASS_ADDED
-@group(1) @binding(WRITES + 4u) var<storage, read_write> added_mass: array<f32>;
-#else
-@group(1) @binding(WRITES + 4u) var<storage, read_write> status: array<atomic<u32>>;
-#endif
-
 // Contact force of one component in N, set back to zero.
 fn taken(at: u32) -> f32 {
     let quanta = contact_force[at];

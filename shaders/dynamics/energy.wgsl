@@ -20,15 +20,6 @@ struct Params {
 @group(2) @binding(1) var<uniform> params: Params;
 
 #if kinetic
-@group(1) @binding(0) var<storage, read> velocity: array<f32>;
-@group(1) @binding(1) var<storage, read> mass: array<f32>;
-#if TOTAL
-@group(1) @binding(2) var<storage, read> reference: array<i32>;
-@group(1) @binding(3) var<storage, read_write> totals: array<f32>;
-#else
-@group(1) @binding(2) var<storage, read_write> totals: array<f32>;
-#endif
-
 fn kinetic(item: u32, local: u32) {
     let first = item * params.length;
     let end = min(first + params.length, params.count);
@@ -56,13 +47,6 @@ fn kinetic(item: u32, local: u32) {
 #endif
 
 #if axial
-@group(1) @binding(0) var<storage, read> tension: array<f32>;
-@group(1) @binding(1) var<storage, read> beams: array<f32>;
-@group(1) @binding(2) var<storage, read_write> totals: array<f32>;
-
-// Numbers of a beam in the table.
-const TABLE: u32 = 5u;
-
 fn axial(item: u32, local: u32) {
     let first = item * params.length;
     let end = min(first + params.length, params.count);

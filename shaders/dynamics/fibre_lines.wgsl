@@ -4,11 +4,8 @@
 #define REFERENCE
 #include "kernel/node"
 #include "kernel/vector"
-#include "elements/mod"
 
 #if ROOT
-// Integers of a group in the table.
-const GROUP: u32 = 6u;
 // Stations that an invocation looks after; STATIONS is the longest line.
 const ROUNDS: u32 = (STATIONS + WORKGROUP - 1u) / WORKGROUP;
 
@@ -18,15 +15,6 @@ struct Params {
 }
 
 @group(2) @binding(1) var<uniform> params: Params;
-
-@group(1) @binding(0) var<storage, read> groups: array<u32>;
-@group(1) @binding(1) var<storage, read> stiffness: array<f32>;
-@group(1) @binding(2) var<storage, read> reference: array<i32>;
-@group(1) @binding(3) var<storage, read> quanta: array<i32>;
-@group(1) @binding(4) var<storage, read> remainder: array<f32>;
-@group(1) @binding(5) var<storage, read> acceleration: array<f32>;
-@group(1) @binding(6) var<storage, read> inverse_mass: array<f32>;
-@group(1) @binding(7) var<storage, read_write> correction: array<f32>;
 
 // Direction of the segment that starts at a station, zero for none, and inverse mass of the station.
 var<workgroup> stations: array<vec4<f32>, STATIONS>;

@@ -21,49 +21,6 @@ struct Params {
 
 @group(2) @binding(1) var<uniform> params: Params;
 
-@group(1) @binding(0) var<storage, read> acceleration: array<f32>;
-#if WORKS
-@group(1) @binding(1) var<storage, read> mass: array<f32>;
-const ACTING: u32 = 2u;
-#else
-const ACTING: u32 = 1u;
-#endif
-#if MASS_ADDED
-@group(1) @binding(ACTING) var<storage, read> inverse_mass: array<f32>;
-const READS: u32 = ACTING + 1u;
-#else
-const READS: u32 = ACTING;
-#endif
-#if LINES
-@group(1) @binding(READS) var<storage, read> correction: array<f32>;
-const WEIGHED: u32 = READS + 1u;
-#else
-const WEIGHED: u32 = READS;
-#endif
-#if GRAVITY
-@group(1) @binding(WEIGHED) var<storage, read> true_mass: array<f32>;
-const WRITES: u32 = WEIGHED + 1u;
-#else
-const WRITES: u32 = WEIGHED;
-#endif
-@group(1) @binding(WRITES) var<storage, read_write> velocity: array<f32>;
-@group(1) @binding(WRITES + 1u) var<storage, read_write> quanta: array<i32>;
-@group(1) @binding(WRITES + 2u) var<storage, read_write> remainder: array<f32>;
-#if WORKS
-// Works, a plane each: of damping, of inertia, of gravity, as far as they are there.
-@group(1) @binding(WRITES + 3u) var<storage, read_write> work: array<f32>;
-#endif
-#if DAMPING
-const INERTIA_PLANE: u32 = 1u;
-#else
-const INERTIA_PLANE: u32 = 0u;
-#endif
-#if INERTIA
-const LAST_PLANE: u32 = INERTIA_PLANE + 1u;
-#else
-const LAST_PLANE: u32 = INERTIA_PLANE;
-#endif
-
 fn integrate(node: u32) {
     let plane = arrayLength(&acceleration) / 3u;
 #if DAMPING
@@ -132,7 +89,7 @@ fn integrate(node: u32) {
     work[node + INERTIA_PLANE * plane] = work[node + INERTIA_PLANE * plane] + inertia;
 #endif
 #if GRAVITY
-    work[node + LAST_PLANE * plane] = work[node + LAST_PLANE * plane] + fallen;
+    work[node + GRAVITY_PLANE * plane] = work[node + GRAVITY_PLANE * plane] + fallen;
 #endif
 }
 #endif

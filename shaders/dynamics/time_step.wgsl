@@ -1,12 +1,7 @@
 // The limit of the time step, node by node.
 
-#include "dynamics/assemble"
-
 #if ROOT
 #if held_limit
-@group(1) @binding(0) var<storage, read> conditions: array<u32>;
-@group(1) @binding(1) var<storage, read_write> limit: array<f32>;
-
 // Leaves out nodes that are held altogether.
 fn held_limit(item: u32) {
     if conditions[2u * item + 1u] == 7u {
@@ -22,53 +17,11 @@ struct Params {
 
 @group(2) @binding(1) var<uniform> params: Params;
 
-@group(1) @binding(0) var<storage, read> solid_bounds: array<u32>;
-@group(1) @binding(1) var<storage, read> hex_bound: array<f32>;
-@group(1) @binding(2) var<storage, read> constant: array<f32>;
-@group(1) @binding(3) var<storage, read> thread_slots: array<u32>;
-@group(1) @binding(4) var<storage, read> beam_force: array<f32>;
-@group(1) @binding(5) var<storage, read> beams: array<f32>;
 #if BENDING
-@group(1) @binding(6) var<storage, read> bend_slots: array<u32>;
-@group(1) @binding(7) var<storage, read> bends: array<f32>;
-@group(1) @binding(8) var<storage, read> bend_energy: array<f32>;
-@group(1) @binding(9) var<storage, read> bend_force: array<f32>;
-@group(1) @binding(10) var<storage, read> bend_rows: array<f32>;
-const NEXT: u32 = 11u;
-#else
-const NEXT: u32 = 6u;
-#endif
-#if weighed_limit
-@group(1) @binding(NEXT) var<storage, read> limit: array<f32>;
-@group(1) @binding(NEXT + 1u) var<storage, read> ends: array<u32>;
-#if BENDING
-@group(1) @binding(NEXT + 2u) var<storage, read> pairs: array<u32>;
-@group(1) @binding(NEXT + 3u) var<storage, read_write> out: array<f32>;
-#else
-@group(1) @binding(NEXT + 2u) var<storage, read_write> out: array<f32>;
-#endif
-#else
-@group(1) @binding(NEXT) var<storage, read> mass: array<f32>;
-#if MASS_ADDED
-@group(1) @binding(NEXT + 1u) var<storage, read> added_mass: array<f32>;
-@group(1) @binding(NEXT + 2u) var<storage, read_write> limit: array<f32>;
-#else
-@group(1) @binding(NEXT + 1u) var<storage, read_write> limit: array<f32>;
-#endif
-#endif
-
-// Numbers of a beam in the table; its length at rest is the fourth, EA the fifth.
-const TABLE: u32 = 5u;
-#if BENDING
-// Numbers of a bend's row sums.
-const ROWS: u32 = 4u;
-// Difference of T and T₀ below which they count as equal.
-const AT_REST: f32 = 1e-3;
-
 // How much stiffer a bend is than a straight one.
 fn stiffening(bend: u32) -> f32 {
-    let stiffness = bends[2u * bend];
-    let rest = bends[2u * bend + 1u];
+    let stiffness = bends[BEND * bend];
+    let rest = bends[BEND * bend + 1u];
     let force = length(vec3<f32>(bend_force[6u * bend], bend_force[6u * bend + 1u], bend_force[6u * bend + 2u]));
     let away = sqrt(bend_energy[bend] / stiffness);
     var t = rest;

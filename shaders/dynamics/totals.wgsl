@@ -1,6 +1,5 @@
 // Totals: columns of numbers added up, and the worst of them, part by part. A workgroup works on a part.
 
-
 var<workgroup> sums: array<f32, WORKGROUP>;
 
 // Adds what the invocations of a workgroup found, the upper half to the lower until one sum is left.
@@ -34,13 +33,6 @@ fn place_of(number: u32, column: u32) -> u32 {
 }
 
 #if sum
-#if TAKEN
-@group(1) @binding(0) var<storage, read_write> source: array<f32>;
-#else
-@group(1) @binding(0) var<storage, read> source: array<f32>;
-#endif
-@group(1) @binding(1) var<storage, read_write> totals: array<f32>;
-
 fn sum(item: u32, local: u32) {
     let column = item % params.columns;
     let first = item / params.columns * params.length;
@@ -61,19 +53,6 @@ fn sum(item: u32, local: u32) {
 #endif
 
 #if worst
-@group(1) @binding(0) var<storage, read> source: array<f32>;
-#if JACOBIAN
-@group(1) @binding(1) var<storage, read> lanes_used: array<u32>;
-@group(1) @binding(2) var<storage, read_write> totals: array<f32>;
-#else
-@group(1) @binding(1) var<storage, read_write> totals: array<f32>;
-#endif
-
-// Hexahedra of a block, and numbers left for a part.
-const LANES: u32 = 16u;
-const WORST: u32 = 2u;
-const LOWEST: f32 = -1e30;
-
 var<workgroup> places: array<u32, WORKGROUP>;
 
 fn worst(item: u32, local: u32) {

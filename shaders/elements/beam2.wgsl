@@ -9,9 +9,6 @@
 #include "kernel/node"
 #include "kernel/vector"
 
-// Numbers of a beam in the table.
-const TABLE: u32 = 5u;
-
 // A beam's reference vector and its change, mm.
 struct Beam {
     reference: vec3<f32>,
@@ -47,28 +44,6 @@ fn add_row(at: u32, row: vec3<f32>) {
 #endif
 
 #if ROOT
-@group(1) @binding(0) var<storage, read> ends: array<u32>;
-@group(1) @binding(1) var<storage, read> beams: array<f32>;
-@group(1) @binding(2) var<storage, read> quanta: array<i32>;
-@group(1) @binding(3) var<storage, read> remainder: array<f32>;
-#if THERMAL
-@group(1) @binding(4) var<storage, read> thermal_strain: array<f32>;
-const WRITES: u32 = 5u;
-#else
-const WRITES: u32 = 4u;
-#endif
-@group(1) @binding(WRITES) var<storage, read_write> forces: array<f32>;
-@group(1) @binding(WRITES + 1u) var<storage, read_write> tensions: array<f32>;
-#if PERIODIC
-@group(1) @binding(WRITES + 2u) var<storage, read_write> virial: array<f32>;
-const WORK: u32 = WRITES + 3u;
-#else
-const WORK: u32 = WRITES + 2u;
-#endif
-#if THERMAL
-@group(1) @binding(WORK) var<storage, read_write> work: array<f32>;
-#endif
-
 fn force(beam: u32) {
     let b = vector(beam);
     let rest = beams[TABLE * beam + 3u];

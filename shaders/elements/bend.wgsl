@@ -3,24 +3,7 @@
 #define VIRIAL
 #include "elements/beam2"
 
-// Numbers of a bend in the table.
-const BEND: u32 = 2u;
-// Largest smoothing of tan(θ/2).
-const SMOOTHING: f32 = 0.005;
-
 #if ROOT
-@group(1) @binding(0) var<storage, read> pairs: array<u32>;
-@group(1) @binding(1) var<storage, read> bends: array<f32>;
-@group(1) @binding(2) var<storage, read> ends: array<u32>;
-@group(1) @binding(3) var<storage, read> beams: array<f32>;
-@group(1) @binding(4) var<storage, read> quanta: array<i32>;
-@group(1) @binding(5) var<storage, read> remainder: array<f32>;
-@group(1) @binding(6) var<storage, read_write> forces: array<f32>;
-@group(1) @binding(7) var<storage, read_write> energies: array<f32>;
-#if PERIODIC
-@group(1) @binding(8) var<storage, read_write> virial: array<f32>;
-#endif
-
 fn force(bend: u32) {
     let stiffness = bends[BEND * bend];
     let rest = bends[BEND * bend + 1u];

@@ -1,16 +1,9 @@
 // What hexahedra share: one invocation works on one lane of a block. The element that includes this says how many numbers a
 // SHAPE has.
 
-#include "elements/mod"
 #include "kernel/row"
 #include "kernel/position"
 #include LAW
-
-// Numbers of a block in the buffers that are written.
-const SLOTS: u32 = 24u * LANES;
-const VIRIAL: u32 = 9u * LANES;
-const ENERGY: u32 = 5u * LANES;
-const BOUND: u32 = 8u * LANES;
 
 struct Params {
     // Nodes in a plane of the position buffers.
@@ -20,25 +13,6 @@ struct Params {
 }
 
 @group(2) @binding(1) var<uniform> params: Params;
-
-@group(1) @binding(0) var<storage, read> headers: array<u32>;
-@group(1) @binding(1) var<storage, read> corners: array<u32>;
-@group(1) @binding(2) var<storage, read> quanta: array<i32>;
-@group(1) @binding(3) var<storage, read> remainder: array<f32>;
-@group(1) @binding(4) var<storage, read> shapes: array<f32>;
-@group(1) @binding(5) var<storage, read> frames: array<f32>;
-@group(1) @binding(6) var<storage, read> materials: array<f32>;
-#if WEIGHED
-@group(1) @binding(7) var<storage, read> weights: array<f32>;
-@group(1) @binding(8) var<storage, read_write> out: array<f32>;
-#else
-@group(1) @binding(7) var<storage, read_write> out: array<f32>;
-#endif
-#if PERIODIC
-#if force
-@group(1) @binding(8) var<storage, read_write> out_virial: array<f32>;
-#endif
-#endif
 
 // A hexahedron: where its numbers start in the tables.
 struct Hex {

@@ -2,13 +2,6 @@
 
 #include "elements/block"
 
-// Numbers of a shape.
-const SHAPE: u32 = 80u * LANES;
-
-// One-dimensional shape function at its own and at the opposite Gauss point.
-const NEAR: f32 = 0.7886751345948129;
-const FAR: f32 = 0.21132486540518713;
-
 // Derivatives with respect to ξ, η and ζ, each at the four points of the other two directions.
 struct Derivatives {
     x: array<vec3<f32>, 4>,

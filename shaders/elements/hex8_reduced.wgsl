@@ -2,20 +2,6 @@
 
 #include "elements/block"
 
-// Numbers of a shape, and where they start: of the B of both ends of each edge along ξ half the difference and half the sum,
-// the volume, Σ h X of each mode, k of each mode.
-const SHAPE: u32 = 41u * LANES;
-const VOLUME: u32 = 24u;
-const MOMENTS: u32 = 25u;
-const STIFFNESS: u32 = 37u;
-
-#if energy
-// Energies of the modes of a block.
-const HOURGLASS: u32 = LANES;
-
-@group(1) @binding(8) var<storage, read_write> out_hourglass: array<f32>;
-#endif
-
 // Deformation of a hexahedron.
 struct Deformation {
     // Mean displacement gradient in the fibre's frame.

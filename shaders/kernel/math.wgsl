@@ -1,11 +1,5 @@
 // Elementary functions as polynomials, to the terms that f32 needs.
 
-const LN2_HIGH: f32 = 0.693145751953125;
-const LN2_LOW: f32 = 1.4286068203094172e-6;
-const LOG2_E: f32 = 1.4426950408889634;
-const SQRT_HALF: u32 = 0x3f3504f3u;
-const BIAS: u32 = 0x3f800000u;
-
 // Mantissa from √½ to √2, and exponent, of a positive normal number.
 fn mantissa_exponent(x: f32) -> vec2<f32> {
     let bits = bitcast<u32>(x);

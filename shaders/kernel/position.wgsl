@@ -1,8 +1,5 @@
 // Positions as whole quanta plus a remainder.
 
-const QUANTUM: f32 = 1.1920928955078125e-7;
-const QUANTA_PER_MM: f32 = 8388608.0;
-
 // Nearest whole number; beyond 4e6 towards zero, as on the CPU.
 fn to_i32(x: f32) -> i32 {
     if abs(x) < 4e6 {
@@ -17,9 +14,6 @@ fn carry(quanta: i32, remainder: ptr<function, f32>) -> i32 {
     *remainder = *remainder - f32(whole) * QUANTUM;
     return quanta + whole;
 }
-
-// Largest displacement along an axis, mm; so far inside of the range of quanta that no node leaves it between two looks.
-const MOST_MM: f32 = 252.0;
 
 // A displacement, mm.
 fn in_mm(quanta: i32, remainder: f32) -> f32 {

@@ -15,13 +15,13 @@ fn main(
 ) {
     let group = workgroup.y * workgroups.x + workgroup.x;
 #if WORKGROUPS
-    if group < items.count * SHARES {
-        KERNEL(items.first * SHARES + group, local);
+    if group < items.count * ITEM_SHARES {
+        KERNEL(items.first * ITEM_SHARES + group, local);
     }
 #else
     let number = group * WORKGROUP + local;
-    if number < items.count * SHARES {
-        KERNEL(items.first * SHARES + number);
+    if number < items.count * ITEM_SHARES {
+        KERNEL(items.first * ITEM_SHARES + number);
     }
 #endif
 }

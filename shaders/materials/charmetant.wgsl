@@ -3,20 +3,6 @@
 #include "materials/mod"
 #include "kernel/math"
 
-const K_ELONG: u32 = 0u;
-const K_COMP: u32 = 1u;
-const P_COMP: u32 = 2u;
-const K_DIST: u32 = 3u;
-const K_SH: u32 = 4u;
-const CAP: u32 = 5u;
-const CAP_SLOPE: u32 = 6u;
-const CAP_ENERGY: u32 = 7u;
-
-// Smallest |I_comp| whose power is taken when the cap is off.
-const TINY: f32 = 1e-30;
-// Smallest det C̃.
-const CRUSHED: f32 = 1e-4;
-
 // State of the cross-section and of the fibre.
 struct State {
     // C − I, the components 12 and 13.

@@ -3,9 +3,6 @@
 // A 3 × 3 tensor; element [i] is row i, so that `v * t` is the tensor times v.
 alias Tensor = mat3x3<f32>;
 
-// Numbers of a law in the material table.
-const PARAMETERS: u32 = 8u;
-
 // Upper estimates of tangent stiffness: of the section, in longitudinal shear, of the fibre, and of its tension.
 struct Moduli {
     across: f32,

@@ -3,15 +3,6 @@
 #include "materials/mod"
 #include "kernel/math"
 
-const MU: u32 = 0u;
-const LAMBDA: u32 = 1u;
-
-// Smallest determinant of F that the logarithm is taken of.
-const CRUSHED: f32 = 1e-3;
-
-// |x| below which φ(x) is taken from its series.
-const SMALL: f32 = 0.05;
-
 // Strain of a volume: C − I, tr cof t + det t, det F, ln J, and φ(x).
 struct Strain {
     t: Tensor,
@@ -34,7 +25,7 @@ fn strain(h: Tensor) -> Strain {
     let j = max(jacobian(h), CRUSHED);
     let log = select(0.5 * log1p(max(x, -0.5)), ln(j), x < -0.5);
     var series = 0.0;
-    for (var n = 13; n >= 2; n--) {
+    for (var n = i32(TERMS); n >= 2; n--) {
         series = fma(series, x, select(-1.0, 1.0, n % 2 == 0) / f32(n));
     }
     return Strain(t, second, j, log, select(x - (log + log), series * x * x, abs(x) < SMALL));

@@ -4,10 +4,11 @@
 //! result does not depend on how many threads there are or which of them takes a chunk.
 
 use super::Backend;
-use crate::kernel::buffer::{Array, Buffer, Description};
+use crate::kernel::buffer::{Array, Buffer, Description, Kind};
+use crate::kernel::interface::{Access, Slot};
 use crate::kernel::lane::{Isa, Real};
 use crate::kernel::row::Row;
-use crate::kernel::stage::{Access, Binding, Code, Io, Stage};
+use crate::kernel::stage::{Binding, Code, Io, Stage};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -15,6 +16,7 @@ use std::time::Instant;
 /// Buffers in host memory, and threads to work on them.
 pub struct Cpu<R: Real> {
     arrays: Vec<Array>,
+    kinds: Vec<Kind>,
     saved: Vec<(Buffer, Array)>,
     isa: Isa,
     pool: Option<rayon::ThreadPool>,
@@ -53,6 +55,7 @@ impl<R: Precision> Cpu<R> {
         });
         Self {
             arrays: buffers.iter().map(Array::new::<R>).collect(),
+            kinds: buffers.iter().map(|description| description.kind).collect(),
             saved: Vec::new(),
             isa,
             pool,
@@ -120,10 +123,23 @@ impl<R: Precision> Backend for Cpu<R> {
                 self.spent.push((stage.name, AtomicU64::new(0)));
             }
         }
-        let addresses: Vec<(*mut u8, usize)> = self.arrays.iter_mut().map(|a| (a.address(), a.len())).collect();
-        let bind = |buffer: Buffer, access: Option<Access>| {
-            let (address, len) = addresses[buffer.0];
-            Binding { address, len, access }
+        let addresses: Vec<*mut u8> = self.arrays.iter_mut().map(Array::address).collect();
+        let (arrays, kinds) = (&self.arrays, &self.kinds);
+        let bindings = |stage: &Stage| -> Vec<Binding> {
+            let (reads, writes) =
+                (stage.reads.iter().map(|b| (*b, None)), stage.writes.iter().map(|(b, a)| (*b, Some(*a))));
+            let slots = stage.kernel.slots.iter().filter(|slot| slot.there);
+            let bind = |((buffer, access), slot): ((Buffer, Option<Access>), &Slot)| {
+                let (len, size) = (arrays[buffer.0].len(), arrays[buffer.0].size());
+                let own = match access {
+                    Some(Access::Own { planes, stride }) => planes * stride * (stage.first + stage.count),
+                    _ => 0,
+                };
+                let fits = kinds[buffer.0] == slot.kind && own <= len;
+                assert!(fits, "stage `{}`, slot `{}`: the buffer does not fit", stage.name, slot.name);
+                Binding { address: addresses[buffer.0], len, size, access }
+            };
+            reads.chain(writes).zip(slots).map(bind).collect()
         };
         let mut groups: Vec<Group<R>> = Vec::new();
         for stage in stages.iter().filter(|stage| stage.count > 0) {
@@ -131,11 +147,9 @@ impl<R: Precision> Backend for Cpu<R> {
                 groups.push(Group { stages: Vec::new(), chunks: Vec::new() });
             }
             let group = groups.last_mut().expect("just pushed");
-            let reads = stage.reads.iter().map(|b| bind(*b, None));
-            let writes = stage.writes.iter().map(|(b, access)| bind(*b, Some(*access)));
             let spent = self.spent.iter().find(|(name, _)| *name == stage.name).map(|(_, spent)| spent);
             group.stages.push(Bound {
-                bindings: reads.chain(writes).collect(),
+                bindings: bindings(stage),
                 params: &stage.params,
                 function: R::function(&stage.kernel),
                 isa: self.isa,

@@ -1,7 +1,10 @@
 //! Prescribed motion: the velocity of chosen components follows the amplitude of the schedule exactly.
 
 use crate::dynamics::integrate::factors;
+use crate::kernel::buffer::Kind::{Scalar, Uint};
+use crate::kernel::interface::{Slot, slot};
 use crate::kernel::lane::{Lane, Real};
+use crate::kernel::position;
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
@@ -16,17 +19,7 @@ pub struct Params {
 }
 
 /// Node and mask of components (bit k for component k), 2 numbers a condition.
-pub const NODES: usize = 0;
-/// Displacement at full amplitude, mm (3).
-pub const TARGETS: usize = 1;
-pub const VELOCITY: usize = 2;
-pub const MASS: usize = 3;
-const ACCELERATION: usize = 4;
-const INVERSE_MASS: usize = 5;
-/// Work of the reaction, mJ.
-const WORK: usize = 6;
-/// Force that the scene exerts on the prescribed components, N (3), weight included.
-const REACTION: usize = 7;
+const NODES: Slot = Slot::read("nodes", Uint);
 
 /// Replaces accelerations of prescribed components, before fibre lines see them; `DAMPING` as for the integration.
 pub struct Prescribed<const DAMPING: bool>;
@@ -34,19 +27,35 @@ pub struct Prescribed<const DAMPING: bool>;
 pub struct Hold;
 
 impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
-    const SHADER: Shader =
-        Shader { defines: &[when(DAMPING, "DAMPING")], ..Shader::new("conditions/prescribed", "prescribed") };
+    const SHADER: Shader = Shader {
+        defines: &[when(DAMPING, "DAMPING")],
+        constants: &[&position::CONSTANTS],
+        ..Shader::new("conditions/prescribed", "prescribed")
+    };
+    const SLOTS: &'static [Slot] = &[
+        NODES,
+        // displacement at full amplitude, mm (3)
+        Slot::read("targets", Scalar),
+        Slot::read("velocity", Scalar),
+        Slot::read("mass", Scalar),
+        Slot::scatter("acceleration", Scalar),
+        Slot::scatter("inverse_mass", Scalar),
+        // of the reaction, mJ
+        Slot::row("work", Scalar, 1),
+        // force that the scene exerts on the prescribed components, N, weight included
+        Slot::row("reactions", Scalar, 3),
+    ];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { first_thread } = io.params();
-        let (nodes, targets, velocity, mass) =
-            (io.uints(NODES), io.scalars(TARGETS), io.scalars(VELOCITY), io.scalars(MASS));
+        let (nodes, targets) = (io.uints(slot!(Self::SLOTS, "nodes")), io.scalars(slot!(Self::SLOTS, "targets")));
+        let (velocity, mass) = (io.scalars(slot!(Self::SLOTS, "velocity")), io.scalars(slot!(Self::SLOTS, "mass")));
         let plane = mass.len();
-        let mut acceleration = io.scatter::<L::Scalar>(ACCELERATION);
-        let mut inverse = io.scatter::<L::Scalar>(INVERSE_MASS);
-        let mut works = io.own::<L::Scalar>(WORK);
-        let mut reactions = io.own::<L::Scalar>(REACTION);
+        let mut acceleration = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "acceleration"));
+        let mut inverse = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "inverse_mass"));
+        let mut works = io.own::<L::Scalar>(slot!(Self::SLOTS, "work"));
+        let mut reactions = io.own::<L::Scalar>(slot!(Self::SLOTS, "reactions"));
         let row = io.row;
         let zero = L::Scalar::from_f64(0.0);
         for item in items {
@@ -78,12 +87,14 @@ impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
 }
 
 impl Kernel for Hold {
-    const SHADER: Shader = Shader::new("conditions/prescribed", "hold");
+    const SHADER: Shader =
+        Shader { constants: &[&position::CONSTANTS], ..Shader::new("conditions/prescribed", "hold") };
+    const SLOTS: &'static [Slot] = &[NODES, Slot::scatter("correction", Scalar)];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let nodes = io.uints(NODES);
-        let mut correction = io.scatter::<L::Scalar>(1);
+        let nodes = io.uints(slot!(Self::SLOTS, "nodes"));
+        let mut correction = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "correction"));
         let plane = correction.len() / 3;
         for item in items {
             for k in (0..3).filter(|k| nodes[2 * item + 1] >> k & 1 == 1) {

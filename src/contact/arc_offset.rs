@@ -10,6 +10,7 @@
 //! constant: forces on these nodes are the exact gradient of the energy.
 
 use crate::elements::beam2;
+use crate::kernel::interface::{Constant, constants};
 use crate::kernel::lane::Real;
 use crate::kernel::node::Displacements;
 use crate::kernel::vector::{Vector, add, scale, sub};
@@ -23,6 +24,8 @@ pub const NEIGHBOURS: usize = 5;
 pub const SHARES: usize = 7;
 /// Where the arc length is.
 pub const ARC: usize = 4;
+/// What twins know of both.
+pub const CONSTANTS: [Constant; 3] = constants![uint: NEIGHBOURS, SHARES, ARC];
 
 /// Tables of the beams before and behind.
 pub struct OffsetLines<'a, R> {

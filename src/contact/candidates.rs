@@ -5,11 +5,13 @@
 //! Carriers near nothing that has moved relative to them (see [`super::skin`]) keep their lists.
 
 use super::grid::{BOX, Moved, SLAB, absolute, cell_index, cells, has_moved, inverse, motion, pull_back, stretch};
-use super::surface::{CARRIED, POINT, Surface, entry, of_coded};
-use super::{EMPTY, Params, found, of_key, status};
+use super::surface::{self, CARRIED, POINT, Surface, entry, of_coded};
+use super::{EMPTY, Params, found, grid, of_key, status};
+use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
+use crate::kernel::interface::{Constant, Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
-use crate::kernel::position::QUANTUM;
+use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::Vector;
@@ -21,33 +23,37 @@ pub const CARRIER: usize = 3;
 /// Integers before the entries of a list, and before the keys of the bodies that a point touches: how often the list was made, and
 /// how often it had been when the point last looked.
 pub const MADE: usize = 1;
+/// What twins know of lists and carriers.
+pub const CONSTANTS: [Constant; 2] = constants![uint: CARRIER, MADE];
 
-const CARRIERS: usize = 0;
-const NODES: usize = 1;
-const POINTS: usize = 2;
-const SLABS: usize = 3;
-const FACES: usize = 4;
-const REFERENCE: usize = 5;
-const QUANTA: usize = 6;
-const REMAINDER: usize = 7;
-const COUNTS: usize = 8;
-const ITEMS: usize = 9;
-const BOXES: usize = 10;
-/// Displacements when everything was last searched, in quanta.
-const BEFORE: usize = 11;
-const NEAR: usize = 12;
-/// See [`found`].
-const FOUND: usize = 13;
-const STATUS: usize = 14;
+const SLOTS: [Slot; 15] = [
+    Slot::read("carriers", Uint),
+    Slot::read("nodes", Uint),
+    Slot::read("points", Scalar),
+    Slot::read("slabs", Uint),
+    Slot::read("faces", Uint),
+    Slot::read("reference", Int),
+    Slot::read("quanta", Int),
+    Slot::read("remainder", Scalar),
+    Slot::read("counts", Uint),
+    Slot::read("lists", Uint),
+    Slot::read("boxes", Scalar),
+    // displacements when everything was last searched, in quanta
+    Slot::read("before", Int),
+    Slot::row_of_plan("near", Uint),
+    // see [`found`]
+    Slot::row("found_when", Uint, 1),
+    Slot::atomic("status", Uint),
+];
 
 /// The search, for beams of threads (`THREAD`) or for nodes of yarn surfaces.
 pub struct Candidates<const THREAD: bool, const PERIODIC: bool>;
 
 /// Bounds that tell how far the nodes of a carrier have moved since everything was searched, quanta.
 #[inline(always)]
-fn moved<R: Real, const N: usize>(io: &Io<R>, coded: [u32; N]) -> ([R; 3], [R; 3]) {
+fn moved<K: Kernel, R: Real, const N: usize>(io: &Io<R>, coded: [u32; N]) -> ([R; 3], [R; 3]) {
     let mut moved = Moved::none();
-    coded.iter().for_each(|node| moved.add(motion(io, [QUANTA, REMAINDER, BEFORE], of_coded(*node).0)));
+    coded.iter().for_each(|node| moved.add(motion::<K, _>(io, of_coded(*node).0)));
     moved.bounds()
 }
 
@@ -173,33 +179,45 @@ impl<R: Real, const PERIODIC: bool> List<'_, R, PERIODIC> {
 impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PERIODIC> {
     const SHADER: Shader = Shader {
         defines: &[when(THREAD, "THREAD"), when(PERIODIC, "PERIODIC")],
+        constants: &[
+            &position::CONSTANTS,
+            &status::CONSTANTS,
+            &super::CONSTANTS,
+            &surface::shared(THREAD),
+            &grid::CONSTANTS,
+            &CONSTANTS,
+        ],
         ..Shader::new("contact/candidates", "candidates")
     };
+    const SLOTS: &'static [Slot] = &SLOTS;
     const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        if THREAD { run::<_, 4, PERIODIC>(io, items) } else { run::<_, 1, PERIODIC>(io, items) }
+        if THREAD { run::<Self, _, 4, PERIODIC>(io, items) } else { run::<Self, _, 1, PERIODIC>(io, items) }
     }
 }
 
 /// Lists of carriers with `N` nodes.
 #[inline(always)]
-fn run<R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, items: Range<usize>) {
+fn run<K: Kernel, R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, items: Range<usize>) {
     let params: Params = io.params();
     let surface = Surface::<_, PERIODIC> {
-        faces: io.uints(FACES),
-        reference: Lattice::new(io, REFERENCE),
-        displacement: Displacements::new(io, QUANTA, REMAINDER),
+        faces: io.uints(slot!(&SLOTS, "faces")),
+        reference: Lattice::new(io, slot!(&SLOTS, "reference")),
+        displacement: Displacements::new(io, slot!(&SLOTS, "quanta"), slot!(&SLOTS, "remainder")),
         gradient: &io.row.gradient,
         period: params.period,
     };
     let inverse = inverse::<_, PERIODIC>(&io.row.gradient);
     let stretch = stretch(&inverse);
-    let (carriers, nodes, points, slabs) = (io.uints(CARRIERS), io.uints(NODES), io.scalars(POINTS), io.uints(SLABS));
-    let (counts, lists, boxes) = (io.uints(COUNTS), io.uints(ITEMS), io.scalars(BOXES));
-    let (mut near, mut when) = (io.own::<u32>(NEAR), io.own::<u32>(FOUND));
-    let flags = io.atomic_uints(STATUS);
+    let (carriers, slabs) = (io.uints(slot!(&SLOTS, "carriers")), io.uints(slot!(&SLOTS, "slabs")));
+    let (nodes, points) = (io.uints(slot!(&SLOTS, "nodes")), io.scalars(slot!(&SLOTS, "points")));
+    let (counts, lists) = (io.uints(slot!(&SLOTS, "counts")), io.uints(slot!(&SLOTS, "lists")));
+    let boxes = io.scalars(slot!(&SLOTS, "boxes"));
+    let mut near = io.own::<u32>(slot!(&SLOTS, "near"));
+    let mut when = io.own::<u32>(slot!(&SLOTS, "found_when"));
+    let flags = io.atomic_uints(slot!(&SLOTS, "status"));
     let period = params.period.map(|p| if PERIODIC { R::from_i32(p) * R::from_f64(QUANTUM) } else { R::from_f64(0.0) });
     let apart = R::from_i32(params.apart as i32);
     for item in items {
@@ -212,7 +230,7 @@ fn run<R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, items: Range<u
             let weights: [R; N] = std::array::from_fn(|a| points[POINT * point + a]);
             surface.point(coded, weights).1
         });
-        let place = Place::new(offsets, absolute(io, [REFERENCE, QUANTA, REMAINDER], &inverse, base), &inverse);
+        let place = Place::new(offsets, absolute::<K, _>(io, &inverse, base), &inverse);
         if !(place.middle[0].is_finite() && place.middle[1].is_finite() && place.heights[0].is_finite()) {
             flags[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
             continue;
@@ -238,7 +256,7 @@ fn run<R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, items: Range<u
         });
         let when = when.at(0, item);
         if *when == found::WITH_ALL {
-            let (least, greatest) = moved(io, coded);
+            let (least, greatest) = moved::<K, _, N>(io, coded);
             if !seen.clone().any(|(_, _, bounds)| has_moved(bounds, least, greatest, apart)) {
                 continue;
             }

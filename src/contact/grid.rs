@@ -5,15 +5,17 @@
 //! most ρ |row of F̄⁻¹| along an axis there. A cell lists its items in any order: what is chosen from them does not depend on it.
 //! Boxes tell how far their items have moved since everything was last searched (see [`super::skin`]).
 
-use super::arc_offset::OffsetLines;
-use super::surface::{FACE, Surface, of_coded};
+use super::arc_offset::{self, OffsetLines};
+use super::surface::{self, FACE, Surface, of_coded};
 use super::{Params, status};
+use crate::elements::beam2;
+use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
+use crate::kernel::interface::{Constant, Slot, constants, joined, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
-use crate::kernel::position::QUANTUM;
+use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, Own, Scatter};
-
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -30,25 +32,33 @@ pub const SLAB: usize = 2;
 pub const SLAB_FACES: usize = 8;
 /// More than rounding moves a place in the plane, mm: an item must not be in too few cells.
 const ROUNDING: f64 = 1e-4;
+/// What twins know of the grid.
+pub const CONSTANTS: [Constant; 5] = constants![uint: BOX, MOTION, SLAB; int: MOST_MOTION; scalar: ROUNDING];
 
-pub const REFERENCE: usize = 0;
-pub const QUANTA: usize = 1;
-pub const REMAINDER: usize = 2;
-/// See [`SLAB`].
-pub const SLABS: usize = 3;
-pub const FACES: usize = 4;
-/// Displacements when everything was last searched, in quanta.
-const SLAB_BEFORE: usize = 5;
-/// Of beams, where those of slabs are.
-pub const ENDS: usize = 3;
-pub const BEAMS: usize = 4;
-/// See [`super::arc_offset`].
-pub const NEIGHBOURS: usize = 5;
-pub const SHARES: usize = 6;
-const BEAM_BEFORE: usize = 7;
+/// Where nodes are: what fills the grid reads it first.
+const PLACE: [Slot; 3] = [Slot::read("reference", Int), Slot::read("quanta", Int), Slot::read("remainder", Scalar)];
+
+/// What fills the grid writes.
+const GRID: [Slot; 4] = [
+    Slot::atomic("counts", Uint),
+    Slot::scatter("lists", Uint),
+    Slot::row("boxes", Scalar, BOX),
+    Slot::atomic("status", Uint),
+];
 
 /// Empties the cells.
 pub struct Clear;
+/// What the twins of both that fill it take from Rust.
+const CONSTANTS_OF_FILLS: &[&[Constant]] = &[
+    &position::CONSTANTS,
+    &beam2::CONSTANTS,
+    &status::CONSTANTS,
+    &super::CONSTANTS,
+    &surface::shared(false),
+    &arc_offset::CONSTANTS,
+    &CONSTANTS,
+];
+
 /// Puts slabs of yarns into cells.
 pub struct FillSlabs<const PERIODIC: bool>;
 /// Puts beams into cells.
@@ -56,10 +66,11 @@ pub struct FillBeams<const PERIODIC: bool>;
 
 impl Kernel for Clear {
     const SHADER: Shader = Shader::new("contact/grid", "clear");
+    const SLOTS: &'static [Slot] = &[Slot::row("counts", Uint, 1)];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let mut counts = io.own::<u32>(0);
+        let mut counts = io.own::<u32>(slot!(Self::SLOTS, "counts"));
         for cell in items {
             *counts.at(0, cell) = 0;
         }
@@ -92,9 +103,9 @@ pub fn pull_back<R: Real>(inverse: &[[R; 2]; 2], v: [R; 3]) -> [R; 2] {
 
 /// Where a node is: pulled-back plane and height, mm. For the grid only; contact works with differences.
 #[inline(always)]
-pub fn absolute<R: Real>(io: &Io<R>, bindings: [usize; 3], inverse: &[[R; 2]; 2], node: usize) -> ([R; 2], R) {
-    let [reference, quanta, remainder] = bindings;
-    let (reference, quanta, remainder) = (io.ints(reference), io.ints(quanta), io.scalars(remainder));
+pub fn absolute<K: Kernel, R: Real>(io: &Io<R>, inverse: &[[R; 2]; 2], node: usize) -> ([R; 2], R) {
+    let reference = io.ints(slot!(K::SLOTS, "reference"));
+    let (quanta, remainder) = (io.ints(slot!(K::SLOTS, "quanta")), io.scalars(slot!(K::SLOTS, "remainder")));
     let plane = remainder.len() / 3;
     let mm = |q: i32| R::from_i32(q) * R::from_f64(QUANTUM);
     let along = |k: usize| mm(quanta[node + k * plane]) + remainder[node + k * plane];
@@ -127,11 +138,11 @@ pub fn cell_index(params: &Params, x: i32, y: i32) -> usize {
     (y.rem_euclid(ny) * nx + x.rem_euclid(nx)) as usize
 }
 
-/// Displacement of a node since everything was searched, quanta. Bindings are quanta, remainder, and the displacement of then.
+/// Displacement of a node since everything was searched, quanta: the kernel binds that of then as `before`.
 #[inline(always)]
-pub fn motion<R: Real>(io: &Io<R>, bindings: [usize; 3], node: usize) -> [i32; 3] {
-    let [quanta, remainder, before] = bindings;
-    let (quanta, remainder, before) = (io.ints(quanta), io.scalars(remainder), io.ints(before));
+pub fn motion<K: Kernel, R: Real>(io: &Io<R>, node: usize) -> [i32; 3] {
+    let (quanta, remainder) = (io.ints(slot!(K::SLOTS, "quanta")), io.scalars(slot!(K::SLOTS, "remainder")));
+    let before = io.ints(slot!(K::SLOTS, "before"));
     let plane = before.len() / 3;
     let along = |k: usize| {
         let i = node + k * plane;
@@ -221,26 +232,33 @@ struct Grid<'a, R> {
 }
 
 impl<'a, R: Real> Grid<'a, R> {
-    /// Writes of a kernel: counts, lists, boxes and status.
+    /// From the bindings of a kernel.
     #[inline(always)]
-    fn new<const PERIODIC: bool>(io: &'a Io<R>, first: usize) -> Self {
+    fn new<K: Kernel, const PERIODIC: bool>(io: &'a Io<R>) -> Self {
         Self {
             params: io.params(),
             inverse: inverse::<R, PERIODIC>(&io.row.gradient),
-            counts: io.atomic_uints(first),
-            lists: io.scatter(first + 1),
-            boxes: io.own(first + 2),
-            flags: io.atomic_uints(first + 3),
+            counts: io.atomic_uints(slot!(K::SLOTS, "counts")),
+            lists: io.scatter(slot!(K::SLOTS, "lists")),
+            boxes: io.own(slot!(K::SLOTS, "boxes")),
+            flags: io.atomic_uints(slot!(K::SLOTS, "status")),
         }
     }
 
     /// Puts an item into every cell that its box touches, `reach` (mm) around.
     #[inline(always)]
-    fn put<const PERIODIC: bool>(&mut self, io: &Io<R>, item: usize, origin: usize, bounds: Bounds<R>, reach: R) {
+    fn put<K: Kernel, const PERIODIC: bool>(
+        &mut self,
+        io: &Io<R>,
+        item: usize,
+        origin: usize,
+        bounds: Bounds<R>,
+        reach: R,
+    ) {
         let Self { params, inverse, counts, lists, boxes, flags } = self;
         let Bounds { low, high, moved } = bounds;
         let (least, greatest): ([R; 3], [R; 3]) = moved.bounds();
-        let (base, height) = absolute(io, [REFERENCE, QUANTA, REMAINDER], inverse, origin);
+        let (base, height) = absolute::<K, _>(io, inverse, origin);
         let (half, stretch) = (R::from_f64(0.5), stretch(inverse));
         boxes.item(0, item).copy_from_slice(&[
             base[0] + half * (low[0] + high[0]),
@@ -276,21 +294,28 @@ impl<'a, R: Real> Grid<'a, R> {
 }
 
 impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
-    const SHADER: Shader =
-        Shader { defines: &[when(PERIODIC, "PERIODIC")], ..Shader::new("contact/grid", "fill_slabs") };
+    const SHADER: Shader = Shader {
+        defines: &[when(PERIODIC, "PERIODIC")],
+        constants: CONSTANTS_OF_FILLS,
+        ..Shader::new("contact/grid", "fill_slabs")
+    };
+    const SLOTS: &'static [Slot] = &joined::<10>(
+        &PLACE,
+        &joined::<7>(&[Slot::read("slabs", Uint), Slot::read("faces", Uint), Slot::read("before", Int)], &GRID),
+    );
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let mut grid = Grid::new::<PERIODIC>(io, SLAB_BEFORE + 1);
+        let mut grid = Grid::new::<Self, PERIODIC>(io);
         let inverse = grid.inverse;
         let surface = Surface::<_, PERIODIC> {
-            faces: io.uints(FACES),
-            reference: Lattice::new(io, REFERENCE),
-            displacement: Displacements::new(io, QUANTA, REMAINDER),
+            faces: io.uints(slot!(Self::SLOTS, "faces")),
+            reference: Lattice::new(io, slot!(Self::SLOTS, "reference")),
+            displacement: Displacements::new(io, slot!(Self::SLOTS, "quanta"), slot!(Self::SLOTS, "remainder")),
             gradient: &io.row.gradient,
             period: grid.params.period,
         };
-        let slabs = io.uints(SLABS);
+        let slabs = io.uints(slot!(Self::SLOTS, "slabs"));
         let reach = L::Scalar::from_f64(f64::from(grid.params.thread_radius + grid.params.skin));
         let zero = [L::Scalar::from_f64(0.0); 3];
         for item in items {
@@ -301,25 +326,44 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
                 let corners = surface.corners(face, [0, 0], origin, (zero, zero));
                 for a in 0..4 {
                     bounds.grow(&inverse, corners.current[a]);
-                    bounds.moved.add(motion(io, [QUANTA, REMAINDER, SLAB_BEFORE], corners.nodes[a]));
+                    bounds.moved.add(motion::<Self, _>(io, corners.nodes[a]));
                 }
             }
-            grid.put::<PERIODIC>(io, item, origin, bounds, reach);
+            grid.put::<Self, PERIODIC>(io, item, origin, bounds, reach);
         }
     }
 }
 
 impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
-    const SHADER: Shader =
-        Shader { defines: &[when(PERIODIC, "PERIODIC")], ..Shader::new("contact/grid", "fill_beams") };
+    const SHADER: Shader = Shader {
+        defines: &[when(PERIODIC, "PERIODIC")],
+        constants: CONSTANTS_OF_FILLS,
+        ..Shader::new("contact/grid", "fill_beams")
+    };
+    const SLOTS: &'static [Slot] = &joined::<12>(
+        &PLACE,
+        &joined::<9>(
+            &[
+                Slot::read("ends", Uint),
+                Slot::read("beams", Scalar),
+                Slot::read("neighbours", Uint),
+                Slot::read("shares", Scalar),
+                Slot::read("before", Int),
+            ],
+            &GRID,
+        ),
+    );
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let mut grid = Grid::new::<PERIODIC>(io, BEAM_BEFORE + 1);
+        let mut grid = Grid::new::<Self, PERIODIC>(io);
         let inverse = grid.inverse;
-        let displacement = Displacements::new(io, QUANTA, REMAINDER);
-        let (ends, beams) = (io.uints(ENDS), io.scalars(BEAMS));
-        let offsets = OffsetLines { neighbours: io.uints(NEIGHBOURS), shares: io.scalars(SHARES) };
+        let displacement = Displacements::new(io, slot!(Self::SLOTS, "quanta"), slot!(Self::SLOTS, "remainder"));
+        let (ends, beams) = (io.uints(slot!(Self::SLOTS, "ends")), io.scalars(slot!(Self::SLOTS, "beams")));
+        let offsets = OffsetLines {
+            neighbours: io.uints(slot!(Self::SLOTS, "neighbours")),
+            shares: io.scalars(slot!(Self::SLOTS, "shares")),
+        };
         let reach = L::Scalar::from_f64(f64::from(2.0 * grid.params.thread_radius + grid.params.skin));
         for item in items {
             let beam = item - grid.params.slabs as usize;
@@ -328,9 +372,9 @@ impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
             piece.now.into_iter().for_each(|end| bounds.grow(&inverse, end));
             let (first, last) = (ends[2 * beam] as usize, ends[2 * beam + 1] as usize);
             for node in [first, last] {
-                bounds.moved.add(motion(io, [QUANTA, REMAINDER, BEAM_BEFORE], node));
+                bounds.moved.add(motion::<Self, _>(io, node));
             }
-            grid.put::<PERIODIC>(io, item, first, bounds, reach);
+            grid.put::<Self, PERIODIC>(io, item, first, bounds, reach);
         }
     }
 }

@@ -23,6 +23,7 @@ pub mod surface;
 pub mod threads;
 pub mod tie;
 
+use crate::kernel::interface::{Constant, constants};
 use crate::kernel::lane::Real;
 use bytemuck::{Pod, Zeroable};
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
@@ -85,11 +86,16 @@ pub mod found {
     pub const NEVER: u32 = 2;
 }
 
+/// What twins know of candidates and sums.
+pub const CONSTANTS: [Constant; 5] = constants![uint: WITH_ALL = found::WITH_ALL, SINCE = found::SINCE, NEVER = found::NEVER, EMPTY; scalar: MOST_QUANTA];
+
 /// No candidate in a slot.
 pub const EMPTY: u32 = u32::MAX;
 
 /// Places in the status buffer.
 pub mod status {
+    use crate::kernel::interface::{Constant, constants};
+
     /// Flags below.
     pub const FLAGS: usize = 0;
     /// Largest displacement since the last search, bits of an f32, mm.
@@ -123,6 +129,12 @@ pub mod status {
     pub const NOT_FINITE: u32 = 8;
     /// A displacement left the range of its quanta.
     pub const OUT_OF_RANGE: u32 = 16;
+
+    /// What twins know of the status; those that have a place for each kind of pair start with that of threads on yarns.
+    pub const CONSTANTS: [Constant; 13] = constants![
+        uint: FLAGS, TRAVEL, PENETRATION = PENETRATION[0], CONTACT_RATE, TOUCHING = TOUCHING[0], SPEED, CULPRIT, SEARCHED,
+            CELL_FULL, SLOTS_FULL, FORCE_RANGE, NOT_FINITE, OUT_OF_RANGE
+    ];
 }
 
 /// Key of a candidate: what is touched, and in which lateral image, −8 to 7 periods along x and y.
@@ -143,6 +155,9 @@ pub fn shift<const PERIODIC: bool>(period: [i32; 2], image: [i32; 2]) -> [i32; 2
     if PERIODIC { [image[0].wrapping_mul(period[0]), image[1].wrapping_mul(period[1])] } else { [0; 2] }
 }
 
+/// What a component of the force of a pair stays below, quanta.
+const MOST_QUANTA: f64 = (1 << 27) as f64;
+
 /// Adds a force in quanta to a node.
 #[inline(always)]
 pub fn add_force(forces: &[AtomicI32], node: usize, quanta: [i32; 3]) {
@@ -155,7 +170,7 @@ pub fn add_force(forces: &[AtomicI32], node: usize, quanta: [i32; 3]) {
 /// Whether a component of a force fits its integer; else names the node.
 #[inline(always)]
 fn is_in_range<R: Real>(status: &[AtomicU32], quanta: R, node: usize) -> bool {
-    let fits = quanta.abs() < R::from_i32(1 << 27);
+    let fits = quanta.abs() < R::from_f64(MOST_QUANTA);
     if !fits {
         status[status::FLAGS].fetch_or(status::FORCE_RANGE, Ordering::Relaxed);
         status[status::CULPRIT].store(node as u32, Ordering::Relaxed);

@@ -26,10 +26,13 @@ use super::candidates::MADE;
 use super::face::{Closest, OnEdge, Patch, closest, on_corner, on_edge};
 use super::friction::slide;
 use super::sums::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
-use super::surface::{CARRIED, Corners, POINT, Surface, of_coded};
-use super::{EMPTY, Params, add_force, add_stiffness, is_in_range, of_key, status};
+use super::surface::{self, CARRIED, Corners, POINT, Surface, of_coded};
+use super::{EMPTY, Params, add_force, add_stiffness, candidates, is_in_range, of_key, status, sums};
+use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
+use crate::kernel::interface::{Constant, Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
+use crate::kernel::position;
 use crate::kernel::row::Row;
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};
@@ -55,25 +58,40 @@ pub const fn touch(friction: bool) -> usize {
     if friction { ELASTIC + 3 } else { ELASTIC }
 }
 
-const NODES: usize = 0;
-const POINTS: usize = 1;
-const FACES: usize = 2;
-const NEAR: usize = 3;
-const REFERENCE: usize = 4;
-const QUANTA: usize = 5;
-const REMAINDER: usize = 6;
-const VELOCITY: usize = 7;
-const MASS: usize = 8;
-const GAP: usize = 9;
-const KEYS: usize = 10;
-const TOUCHES: usize = 11;
-const SUM: usize = 12;
-const FORCE: usize = 13;
-const STIFFNESS: usize = 14;
-const STATUS: usize = 15;
+/// What the twin takes from Rust, of points of a `kind`.
+const fn shared(kind: usize, friction: bool) -> [Constant; 11] {
+    constants![
+        uint: LEAST, CLOSED, INNER, GAPS, NORMAL, DAMPED, ELASTIC, TOUCH = touch(friction), KIND = kind;
+        scalar: GAP_ROUNDING, TIE
+    ]
+}
+
+const SLOTS: [Slot; 16] = [
+    Slot::read("nodes", Uint),
+    Slot::read("points", Scalar),
+    Slot::read("faces", Uint),
+    Slot::read("near", Uint),
+    Slot::read("reference", Int),
+    Slot::read("quanta", Int),
+    Slot::read("remainder", Scalar),
+    Slot::read("velocity", Scalar),
+    Slot::read("mass", Scalar),
+    Slot::row_of_plan("gaps", Scalar),
+    Slot::row_of_plan("keys", Uint),
+    Slot::row_of_plan("touches", Scalar),
+    Slot::row_of_plan("sums", Scalar),
+    Slot::atomic("forces", Int),
+    Slot::atomic("stiffness", Int),
+    Slot::atomic("status", Uint),
+];
 
 /// Contact forces of points of threads (`THREAD`) or of nodes of yarn surfaces on yarns.
 pub struct Penalty<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool>;
+
+/// Place of the kind of points in the status.
+const fn kind(threads: bool) -> usize {
+    if threads { 0 } else { 1 }
+}
 
 /// Viscosity, N·s/mm, that damps a spring of `penalty` (N/mm) between masses of joint inverse `inverse` (1/tonne) by the share of
 /// the critical one that is asked for.
@@ -354,17 +372,17 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
             row: io.row,
             elapsed: io.row.dt_mid + io.row.dt_mid - io.row.dt,
             surface: Surface {
-                faces: io.uints(FACES),
-                reference: Lattice::new(io, REFERENCE),
-                displacement: Displacements::new(io, QUANTA, REMAINDER),
+                faces: io.uints(slot!(&SLOTS, "faces")),
+                reference: Lattice::new(io, slot!(&SLOTS, "reference")),
+                displacement: Displacements::new(io, slot!(&SLOTS, "quanta"), slot!(&SLOTS, "remainder")),
                 gradient: &io.row.gradient,
                 period: params.period,
             },
-            velocity: Field::new(io, VELOCITY),
-            mass: io.scalars(MASS),
-            forces: io.atomics(FORCE),
-            stiffness: io.atomics(STIFFNESS),
-            flags: io.atomic_uints(STATUS),
+            velocity: Field::new(io, slot!(&SLOTS, "velocity")),
+            mass: io.scalars(slot!(&SLOTS, "mass")),
+            forces: io.atomics(slot!(&SLOTS, "forces")),
+            stiffness: io.atomics(slot!(&SLOTS, "stiffness")),
+            flags: io.atomic_uints(slot!(&SLOTS, "status")),
             kind,
         }
     }
@@ -669,16 +687,26 @@ fn place_of(keys: &[u32], key: u32, begins: bool) -> Option<usize> {
 impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for Penalty<THREAD, FRICTION, PERIODIC> {
     const SHADER: Shader = Shader {
         defines: &[when(THREAD, "THREAD"), when(FRICTION, "FRICTION"), when(PERIODIC, "PERIODIC")],
+        constants: &[
+            &position::CONSTANTS,
+            &status::CONSTANTS,
+            &super::CONSTANTS,
+            &surface::shared(THREAD),
+            &candidates::CONSTANTS,
+            &sums::shared(FRICTION, PERIODIC),
+            &shared(kind(THREAD), FRICTION),
+        ],
         ..Shader::new("contact/penalty", "penalty")
     };
+    const SLOTS: &'static [Slot] = &SLOTS;
     const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         if THREAD {
-            run::<_, 4, FRICTION, PERIODIC>(io, items, 0);
+            run::<_, 4, FRICTION, PERIODIC>(io, items, kind(THREAD));
         } else {
-            run::<_, 1, FRICTION, PERIODIC>(io, items, 1);
+            run::<_, 1, FRICTION, PERIODIC>(io, items, kind(THREAD));
         }
     }
 }
@@ -691,9 +719,10 @@ fn run<R: Real, const N: usize, const FRICTION: bool, const PERIODIC: bool>(
     kind: usize,
 ) {
     let step = Step::<_, FRICTION, PERIODIC>::new(io, kind);
-    let (nodes, points, near) = (io.uints(NODES), io.scalars(POINTS), io.uints(NEAR));
-    let (mut gaps, mut keys, mut touches) = (io.own::<R>(GAP), io.own::<u32>(KEYS), io.own::<R>(TOUCHES));
-    let mut sums = io.own::<R>(SUM);
+    let (nodes, points) = (io.uints(slot!(&SLOTS, "nodes")), io.scalars(slot!(&SLOTS, "points")));
+    let near = io.uints(slot!(&SLOTS, "near"));
+    let (mut gaps, mut keys) = (io.own::<R>(slot!(&SLOTS, "gaps")), io.own::<u32>(slot!(&SLOTS, "keys")));
+    let (mut touches, mut sums) = (io.own::<R>(slot!(&SLOTS, "touches")), io.own::<R>(slot!(&SLOTS, "sums")));
     let (zero, faces) = (R::from_f64(0.0), step.params.faces as usize);
     for item in items {
         let (coded, list) = nodes[CARRIED * item..][..CARRIED].split_at(CARRIED - 1);

@@ -17,6 +17,7 @@
 //! Contact). Hence neither side depends on how it is cut into segments. One that *owns* the joint at its first end has it taken off, where
 //! that end is closest both cancel and nothing is left.
 
+use crate::kernel::interface::{Constant, constants};
 use crate::kernel::lane::Real;
 use crate::kernel::vector::{Vector, add, dot, fma, scale, sub};
 
@@ -63,6 +64,8 @@ const GAUSS: [[f64; 2]; 3] =
     [[0.112_701_665_379_258_31, 5.0 / 18.0], [0.5, 8.0 / 18.0], [0.887_298_334_620_741_7, 5.0 / 18.0]];
 /// Least |dq/ds| of partners and least curvature of q over R², so that divisions are of numbers: of lines at right angles, and parallel.
 const STRAIGHT: f64 = 1e-20;
+/// What the twin takes from Rust.
+pub const CONSTANTS: [Constant; 1] = constants![scalar: STRAIGHT];
 
 impl<R: Real> Segments<R> {
     /// Where the first end of B, its inside and its second end are closest, and where the first end is not.

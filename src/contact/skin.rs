@@ -12,25 +12,24 @@
 //! skin is for what nodes travel before the look that is due.
 
 use super::status;
+use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
+use crate::kernel::interface::{Constant, Slot, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
-use crate::kernel::position::{MOST_MM, difference, in_mm};
+use crate::kernel::position::{self, MOST_MM, difference, in_mm};
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::dot;
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
-pub const QUANTA: usize = 0;
-pub const REMAINDER: usize = 1;
-/// Displacements at the last look; [`Travel`] reads the velocity first, and these only with contact.
-pub const SEARCH_QUANTA: usize = 2;
-pub const SEARCH_REMAINDER: usize = 3;
-
 /// Share of the contact skin that nodes may travel before a look.
 pub const SKIN_USED: f64 = 0.25;
 /// And the one that bodies may have moved relative to each other since candidates were searched.
 pub const SKIN_APART: f64 = 0.5 * SKIN_USED;
+
+/// What the twin takes from Rust.
+const CONSTANTS: &[&[Constant]] = &[&position::CONSTANTS, &status::CONSTANTS];
 
 /// Notes displacements at a look.
 pub struct Remember;
@@ -38,13 +37,19 @@ pub struct Remember;
 pub struct Travel<const CONTACT: bool>;
 
 impl Kernel for Remember {
-    const SHADER: Shader = Shader::new("contact/skin", "remember");
+    const SHADER: Shader = Shader { constants: CONSTANTS, ..Shader::new("contact/skin", "remember") };
+    const SLOTS: &'static [Slot] = &[
+        Slot::read("quanta", Int),
+        Slot::read("remainder", Scalar),
+        Slot::planes("search_quanta", Int, 3),
+        Slot::planes("search_remainder", Scalar, 3),
+    ];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let (quanta, remainder) = (io.ints(QUANTA), io.scalars(REMAINDER));
-        let mut search_quanta = io.own::<i32>(SEARCH_QUANTA);
-        let mut search_remainder = io.own::<L::Scalar>(SEARCH_REMAINDER);
+        let (quanta, remainder) = (io.ints(slot!(Self::SLOTS, "quanta")), io.scalars(slot!(Self::SLOTS, "remainder")));
+        let mut search_quanta = io.own::<i32>(slot!(Self::SLOTS, "search_quanta"));
+        let mut search_remainder = io.own::<L::Scalar>(slot!(Self::SLOTS, "search_remainder"));
         let plane = remainder.len() / 3;
         for node in items {
             for k in 0..3 {
@@ -56,16 +61,28 @@ impl Kernel for Remember {
 }
 
 impl<const CONTACT: bool> Kernel for Travel<CONTACT> {
-    const SHADER: Shader = Shader { defines: &[when(CONTACT, "CONTACT")], ..Shader::new("contact/skin", "travel") };
+    const SHADER: Shader =
+        Shader { defines: &[when(CONTACT, "CONTACT")], constants: CONSTANTS, ..Shader::new("contact/skin", "travel") };
+    const SLOTS: &'static [Slot] = &[
+        Slot::read("quanta", Int),
+        Slot::read("remainder", Scalar),
+        Slot::read("velocity", Scalar),
+        // displacements at the last look
+        Slot::read("search_quanta", Int).when(CONTACT),
+        Slot::read("search_remainder", Scalar).when(CONTACT),
+        Slot::atomic("status", Uint),
+    ];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        const VELOCITY: usize = 2;
-        let (quanta, remainder) = (io.ints(QUANTA), io.scalars(REMAINDER));
-        let searched = CONTACT.then(|| (io.ints(SEARCH_QUANTA + 1), io.scalars(SEARCH_REMAINDER + 1)));
-        let status = io.atomic_uints(if CONTACT { 5 } else { 3 });
+        let (quanta, remainder) = (io.ints(slot!(Self::SLOTS, "quanta")), io.scalars(slot!(Self::SLOTS, "remainder")));
+        let searched = CONTACT.then(|| {
+            let quanta = io.ints(slot!(Self::SLOTS, "search_quanta", CONTACT));
+            (quanta, io.scalars(slot!(Self::SLOTS, "search_remainder", CONTACT)))
+        });
+        let status = io.atomic_uints(slot!(Self::SLOTS, "status"));
         let plane = remainder.len() / 3;
-        let velocity = Field::new(io, VELOCITY);
+        let velocity = Field::new(io, slot!(Self::SLOTS, "velocity"));
         let (mut largest, mut fastest) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(0.0));
         for node in items {
             let (mut square, mut furthest) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(0.0));

@@ -1,5 +1,6 @@
 //! What contact sums up for each point and each beam: energies, slip, and the share of the homogenised stress.
 
+use crate::kernel::interface::{Constant, constants};
 use crate::kernel::lane::Real;
 use crate::kernel::vector::Vector;
 
@@ -19,6 +20,14 @@ pub const fn virial(friction: bool) -> usize {
 /// Number of the sums.
 pub const fn sums(friction: bool, periodic: bool) -> usize {
     virial(friction) + if periodic { 9 } else { 0 }
+}
+
+/// What twins know of the sums.
+pub const fn shared(friction: bool, periodic: bool) -> [Constant; 7] {
+    constants![
+        uint: SUM_ENERGY, SUM_DAMPING, SUM_RADIUS, SUM_FRICTION, SUM_SLIP, SUM_VIRIAL = virial(friction),
+            SUMS = sums(friction, periodic)
+    ]
 }
 
 /// Subtracts force ⊗ ΔX from the nine sums that make the homogenised stress.

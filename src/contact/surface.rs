@@ -6,6 +6,7 @@
 //! [`super::penalty`]).
 
 use super::{key, shift};
+use crate::kernel::interface::{Constant, constants};
 use crate::kernel::lane::Real;
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::vector::{Vector, add, apply, fma, sub};
@@ -16,6 +17,10 @@ pub const FACE: usize = 5;
 pub const CARRIED: usize = 5;
 /// Numbers of a point: weights of its four nodes; penalty, N/mm; radius, mm.
 pub const POINT: usize = 6;
+/// What twins know of faces and points, whose carriers are beams of `threads` or nodes of yarns.
+pub const fn shared(threads: bool) -> [Constant; 4] {
+    constants![uint: FACE, CARRIED, POINT, CARRIED_BY = if threads { 4 } else { 1 }]
+}
 /// Most nodes that a corner can tell apart, and most faces that an entry of a list can.
 pub const MOST_NODES: usize = 1 << 26;
 pub const MOST_FACES: usize = (1 << 24) - 1;

@@ -11,16 +11,20 @@
 //! A pair with a gap is left alone until the gap can have closed, as in [`super::penalty`]: points of lines move at most as fast as
 //! nodes times the sum of their weights.
 
-use super::arc_offset::{OffsetLines, Piece};
+use super::arc_offset::{self, OffsetLines, Piece};
 use super::friction::slide;
-use super::grid::{BOX, MOTION, absolute, cell_index, cells, has_moved, inverse, pull_back};
-use super::segments::{Push, Segments};
-use super::sums::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
-use super::{EMPTY, Params, add_force, add_stiffness, found, is_in_range, key, of_key, shift, slot_state, status};
-use crate::elements::beam2::TABLE;
+use super::grid::{self, BOX, MOTION, absolute, cell_index, cells, has_moved, inverse, pull_back};
+use super::segments::{self, Push, Segments};
+use super::sums::{self, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
+use super::{
+    EMPTY, Params, add_force, add_stiffness, found, is_in_range, key, of_key, shift, slot_state, status, surface,
+};
+use crate::elements::beam2::{self, TABLE};
+use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
+use crate::kernel::interface::{Slot, constants, joined, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
-use crate::kernel::position::QUANTUM;
+use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::row::Row;
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};
@@ -33,14 +37,46 @@ pub const MOST_PAIRS: usize = 64;
 /// Share of a beam below which the length that touches is not divided by.
 const LEAST: f64 = 1e-6;
 
-pub const ENDS: usize = 0;
-pub const BEAMS: usize = 1;
-pub const REFERENCE: usize = 2;
-pub const QUANTA: usize = 3;
-pub const REMAINDER: usize = 4;
-/// See [`super::arc_offset`].
-pub const NEIGHBOURS: usize = 5;
-pub const SHARES: usize = 6;
+/// What both kernels read of beams.
+const READS: [Slot; 7] = [
+    Slot::read("ends", Uint),
+    Slot::read("beams", Scalar),
+    Slot::read("reference", Int),
+    Slot::read("quanta", Int),
+    Slot::read("remainder", Scalar),
+    // see [`super::arc_offset`]
+    Slot::read("neighbours", Uint),
+    Slot::read("shares", Scalar),
+];
+
+/// The slots of [`Pairs`].
+const PAIRS: [Slot; 14] = joined(
+    &READS,
+    &[
+        Slot::read("counts", Uint),
+        Slot::read("lists", Uint),
+        Slot::read("boxes", Scalar),
+        Slot::row_of_plan("keys", Uint),
+        Slot::row_of_plan("states", Scalar),
+        Slot::row("found_when", Uint, 1),
+        Slot::atomic("status", Uint),
+    ],
+);
+
+/// The slots of [`Force`].
+const FORCE: [Slot; 15] = joined(
+    &READS,
+    &[
+        Slot::read("velocity", Scalar),
+        Slot::read("mass", Scalar),
+        Slot::row_of_plan("keys", Uint),
+        Slot::row_of_plan("states", Scalar),
+        Slot::row_of_plan("sums", Scalar),
+        Slot::atomic("forces", Int),
+        Slot::atomic("stiffness", Int),
+        Slot::atomic("status", Uint),
+    ],
+);
 
 /// Finds pairs of beams.
 pub struct Pairs<const PERIODIC: bool>;
@@ -63,11 +99,14 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
     #[inline(always)]
     fn new(io: &'a Io<R>, params: &Params) -> Self {
         Self {
-            ends: io.uints(ENDS),
-            beams: io.scalars(BEAMS),
-            offsets: OffsetLines { neighbours: io.uints(NEIGHBOURS), shares: io.scalars(SHARES) },
-            reference: Lattice::new(io, REFERENCE),
-            displacement: Displacements::new(io, QUANTA, REMAINDER),
+            ends: io.uints(slot!(&READS, "ends")),
+            beams: io.scalars(slot!(&READS, "beams")),
+            offsets: OffsetLines {
+                neighbours: io.uints(slot!(&READS, "neighbours")),
+                shares: io.scalars(slot!(&READS, "shares")),
+            },
+            reference: Lattice::new(io, slot!(&READS, "reference")),
+            displacement: Displacements::new(io, slot!(&READS, "quanta"), slot!(&READS, "remainder")),
             gradient: &io.row.gradient,
             period: params.period,
             self_arc: R::from_f64(f64::from(params.self_arc)),
@@ -122,7 +161,7 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
     /// The cells of a beam's piece; `None` if it is nowhere.
     #[inline(always)]
     fn cells(&self, io: &Io<R>, beam: usize, piece: &Piece<R>) -> Option<Cells> {
-        let (node, _) = absolute(io, [REFERENCE, QUANTA, REMAINDER], &self.inverse, self.scene.ends[2 * beam] as usize);
+        let (node, _) = absolute::<Pairs<PERIODIC>, _>(io, &self.inverse, self.scene.ends[2 * beam] as usize);
         let ends = piece.now.map(|end| pull_back(&self.inverse, end));
         let range = |k: usize| {
             let (a, b) = (node[k] + ends[0][k], node[k] + ends[1][k]);
@@ -246,7 +285,21 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
 }
 
 impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
-    const SHADER: Shader = Shader { defines: &[when(PERIODIC, "PERIODIC")], ..Shader::new("contact/threads", "pairs") };
+    const SHADER: Shader = Shader {
+        defines: &[when(PERIODIC, "PERIODIC")],
+        constants: &[
+            &position::CONSTANTS,
+            &beam2::CONSTANTS,
+            &status::CONSTANTS,
+            &super::CONSTANTS,
+            &surface::shared(true),
+            &grid::CONSTANTS,
+            &arc_offset::CONSTANTS,
+            &segments::CONSTANTS,
+        ],
+        ..Shader::new("contact/threads", "pairs")
+    };
+    const SLOTS: &'static [Slot] = &PAIRS;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -254,16 +307,16 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
         let search = Search::<_, PERIODIC> {
             scene: Scene::new(io, &params),
             params,
-            counts: io.uints(7),
-            lists: io.uints(8),
-            boxes: io.scalars(9),
+            counts: io.uints(slot!(&PAIRS, "counts")),
+            lists: io.uints(slot!(&PAIRS, "lists")),
+            boxes: io.scalars(slot!(&PAIRS, "boxes")),
             inverse: inverse::<_, PERIODIC>(&io.row.gradient),
             reach: L::Scalar::from_f64(f64::from(2.0 * params.thread_radius + params.skin)),
         };
-        let mut keys = io.own::<u32>(10);
-        let mut states = io.own::<L::Scalar>(11);
-        let mut when = io.own::<u32>(12);
-        let flags = io.atomic_uints(13);
+        let mut keys = io.own::<u32>(slot!(&PAIRS, "keys"));
+        let mut states = io.own::<L::Scalar>(slot!(&PAIRS, "states"));
+        let mut when = io.own::<u32>(slot!(&PAIRS, "found_when"));
+        let flags = io.atomic_uints(slot!(&PAIRS, "status"));
         for beam in items {
             let piece = search.scene.piece(beam);
             let Some(cells) = search.cells(io, beam, &piece) else {
@@ -366,18 +419,16 @@ fn real<R: Real>(x: f32) -> R {
 impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICTION, PERIODIC> {
     #[inline(always)]
     fn new(io: &'a Io<R>) -> Self {
-        const VELOCITY: usize = 7;
-        const MASS: usize = 8;
         let params: Params = io.params();
         let thick = real::<R>(2.0 * params.thread_radius);
         Self {
             scene: Scene::new(io, &params),
             row: io.row,
-            velocity: Field::new(io, VELOCITY),
-            mass: io.scalars(MASS),
-            forces: io.atomics(12),
-            stiffness: io.atomics(13),
-            flags: io.atomic_uints(14),
+            velocity: Field::new(io, slot!(&FORCE, "velocity")),
+            mass: io.scalars(slot!(&FORCE, "mass")),
+            forces: io.atomics(slot!(&FORCE, "forces")),
+            stiffness: io.atomics(slot!(&FORCE, "stiffness")),
+            flags: io.atomic_uints(slot!(&FORCE, "status")),
             params,
             reach: thick * io.row.radius,
             growth: thick * io.row.radius_increment,
@@ -531,17 +582,30 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
 impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERIODIC> {
     const SHADER: Shader = Shader {
         defines: &[when(FRICTION, "FRICTION"), when(PERIODIC, "PERIODIC")],
+        constants: &[
+            &position::CONSTANTS,
+            &beam2::CONSTANTS,
+            &status::CONSTANTS,
+            &super::CONSTANTS,
+            &surface::shared(true),
+            &grid::CONSTANTS,
+            &arc_offset::CONSTANTS,
+            &segments::CONSTANTS,
+            &sums::shared(FRICTION, PERIODIC),
+            &constants![uint: SLOT_STATE = slot_state(FRICTION); scalar: LEAST],
+        ],
         ..Shader::new("contact/threads", "force")
     };
+    const SLOTS: &'static [Slot] = &FORCE;
     const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let zero = L::Scalar::from_f64(0.0);
         let touch = Touch::<_, FRICTION, PERIODIC>::new(io);
-        let mut keys = io.own::<u32>(9);
-        let mut states = io.own::<L::Scalar>(10);
-        let mut sums = io.own::<L::Scalar>(11);
+        let mut keys = io.own::<u32>(slot!(&FORCE, "keys"));
+        let mut states = io.own::<L::Scalar>(slot!(&FORCE, "states"));
+        let mut sums = io.own::<L::Scalar>(slot!(&FORCE, "sums"));
         for beam in items {
             let slot_keys = keys.item(0, beam);
             if slot_keys[0] == EMPTY {

@@ -1,44 +1,53 @@
 //! Ties: a node that is held at a point of another body's surface by a spring, for cut threads whose ends stay caught between the
 //! fibres. The spring pulls on the difference of displacements, hence not at the start.
 
-use super::{Params, add_pair, add_stiffness};
+use super::{Params, add_pair, add_stiffness, status};
+use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
+use crate::kernel::interface::{Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Displacements;
+use crate::kernel::position;
 use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{dot, fma, scale};
 use std::ops::Range;
 
 /// Nodes of a tie: the one that is held, and the corners of the face that holds it.
-pub const NODES: usize = 5;
+const NODES: usize = 5;
 /// Numbers of a tie: weights of the corners; stiffness, N/mm.
-pub const VALUES: usize = 5;
-
-pub const TIES: usize = 0;
-pub const TABLE: usize = 1;
-pub const QUANTA: usize = 2;
-pub const REMAINDER: usize = 3;
-/// Elastic energy now, mJ.
-const ENERGY: usize = 4;
-const FORCE: usize = 5;
-const STIFFNESS: usize = 6;
-const STATUS: usize = 7;
+const VALUES: usize = 5;
 
 /// Forces of ties.
 pub struct Tie;
 
 impl Kernel for Tie {
-    const SHADER: Shader = Shader::new("contact/tie", "tie");
+    const SHADER: Shader = Shader {
+        constants: &[&position::CONSTANTS, &status::CONSTANTS, &super::CONSTANTS, &constants![uint: NODES, VALUES]],
+        ..Shader::new("contact/tie", "tie")
+    };
+    const SLOTS: &'static [Slot] = &[
+        Slot::read("ties", Uint),
+        Slot::read("values", Scalar),
+        Slot::read("quanta", Int),
+        Slot::read("remainder", Scalar),
+        // elastic, now, mJ
+        Slot::row("energies", Scalar, 1),
+        Slot::atomic("forces", Int),
+        Slot::atomic("stiffness", Int),
+        Slot::atomic("status", Uint),
+    ];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();
         let real = |x: f32| L::Scalar::from_f64(f64::from(x));
         let constant = L::Scalar::from_f64;
-        let (ties, table) = (io.uints(TIES), io.scalars(TABLE));
-        let displacement = Displacements::new(io, QUANTA, REMAINDER);
-        let mut energies = io.own::<L::Scalar>(ENERGY);
-        let (forces, stiffness, flags) = (io.atomics(FORCE), io.atomics(STIFFNESS), io.atomic_uints(STATUS));
+        let (ties, table) = (io.uints(slot!(Self::SLOTS, "ties")), io.scalars(slot!(Self::SLOTS, "values")));
+        let displacement = Displacements::new(io, slot!(Self::SLOTS, "quanta"), slot!(Self::SLOTS, "remainder"));
+        let mut energies = io.own::<L::Scalar>(slot!(Self::SLOTS, "energies"));
+        let (forces, stiffness) =
+            (io.atomics(slot!(Self::SLOTS, "forces")), io.atomics(slot!(Self::SLOTS, "stiffness")));
+        let flags = io.atomic_uints(slot!(Self::SLOTS, "status"));
         for item in items {
             let (nodes, values) = (&ties[NODES * item..][..NODES], &table[VALUES * item..][..VALUES]);
             let held = nodes[0] as usize;

@@ -8,8 +8,10 @@
 //! same for elements alone: a few slivers at cut edges need not hold up a scene. Without contact-aware mass, the largest K/m of
 //! contact is reported for the choice of the time step.
 
-use crate::contact::status::CONTACT_RATE;
-use crate::elements::LANES;
+use crate::contact::status::{self, CONTACT_RATE};
+use crate::elements::{self, LANES};
+use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
+use crate::kernel::interface::{Constant, Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};
@@ -24,6 +26,8 @@ pub const THREAD: usize = 2;
 pub const BENT: usize = 3;
 /// Nothing to gather.
 pub const NONE: u32 = u32::MAX;
+/// What twins know of the slots of nodes.
+pub const CONSTANTS: [Constant; 4] = constants![uint: SOLID, THREAD, BENT, NONE];
 
 /// Constants of the stage.
 #[repr(C)]
@@ -45,30 +49,6 @@ pub struct Params {
     pub gravity: [f32; 3],
 }
 
-pub const SOLID_SLOTS: usize = 0;
-pub const HEX_FORCE: usize = 1;
-pub const THREAD_SLOTS: usize = 2;
-pub const BEAM_FORCE: usize = 3;
-pub const MASS: usize = 4;
-/// Slots and forces of bends, only with `BENDING`; without it, what follows is two numbers earlier.
-pub const BEND_SLOTS: usize = 5;
-pub const BEND_FORCE: usize = 6;
-/// Row sums of element stiffness, N/mm; only with `MASS_ADDED`.
-pub const ELEMENT_STIFFNESS: usize = 7;
-/// True mass, tonne; only with `GRAVITY`; without what is missing before it, it and all that follows are earlier.
-pub const TRUE_MASS: usize = 8;
-/// The first write: acceleration, mm/s² (3 planes).
-const ACCELERATION: usize = 9;
-/// Inverse of the mass that acts, 1/tonne.
-const INVERSE_MASS: usize = 10;
-/// Contact force in quanta (3 planes), set back to zero.
-const CONTACT_FORCE: usize = 11;
-/// Contact stiffness in quanta, set back to zero.
-const CONTACT_STIFFNESS: usize = 12;
-/// Added mass, tonne; without `MASS_ADDED`, the status.
-const ADDED_MASS: usize = 13;
-const STATUS: usize = 13;
-
 /// Assembly; with `CONTACT` contact forces, with `MASS_ADDED` contact-aware mass, with `BENDING` bends of threads, with `GRAVITY`
 /// weight.
 pub struct Assemble<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRAVITY: bool>;
@@ -83,27 +63,53 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
             when(BENDING, "BENDING"),
             when(GRAVITY, "GRAVITY"),
         ],
+        constants: &[&elements::CONSTANTS, &status::CONSTANTS, &CONSTANTS],
         ..Shader::new("dynamics/assemble", "assemble")
     };
+    const SLOTS: &'static [Slot] = &[
+        Slot::read("solid_slots", Uint),
+        Slot::read("hex_force", Scalar),
+        Slot::read("thread_slots", Uint),
+        Slot::read("beam_force", Scalar),
+        Slot::read("mass", Scalar),
+        Slot::read("bend_slots", Uint).when(BENDING),
+        Slot::read("bend_force", Scalar).when(BENDING),
+        // row sums of element stiffness, N/mm
+        Slot::read("element_stiffness", Scalar).when(MASS_ADDED),
+        // true mass, tonne
+        Slot::read("true_mass", Scalar).when(GRAVITY),
+        // mm/s²
+        Slot::planes("acceleration", Scalar, 3),
+        // of the mass that acts, 1/tonne
+        Slot::row("inverse_mass", Scalar, 1),
+        // in quanta, set back to zero
+        Slot::planes("contact_force", Int, 3).when(CONTACT),
+        Slot::row("contact_stiffness", Int, 1).when(CONTACT),
+        // tonne
+        Slot::row("added_mass", Scalar, 1).when(CONTACT && MASS_ADDED),
+        Slot::atomic("status", Uint).when(CONTACT && !MASS_ADDED),
+    ];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();
         let first_thread = params.first_thread as usize;
-        let (solid, hexes) = (io.uints(SOLID_SLOTS), io.scalars(HEX_FORCE));
-        let (thread, beams) = (io.uints(THREAD_SLOTS), io.scalars(BEAM_FORCE));
-        let bends = BENDING.then(|| (io.uints(BEND_SLOTS), io.scalars(BEND_FORCE)));
-        let masses = io.scalars(MASS);
-        let unbent = 2 * usize::from(!BENDING);
-        let unweighed = unbent + usize::from(!MASS_ADDED);
-        let true_masses = if GRAVITY { io.scalars(TRUE_MASS - unweighed) } else { &[] };
-        let missing = unweighed + usize::from(!GRAVITY);
-        let mut acceleration = io.own::<L::Scalar>(ACCELERATION - missing);
-        let mut inverse = io.own::<L::Scalar>(INVERSE_MASS - missing);
-        let mut contact_force = CONTACT.then(|| io.own::<i32>(CONTACT_FORCE - missing));
-        let mut contact_stiffness = CONTACT.then(|| io.own::<i32>(CONTACT_STIFFNESS - missing));
-        let elements = if MASS_ADDED { io.scalars(ELEMENT_STIFFNESS - unbent) } else { &[] };
-        let mut added = MASS_ADDED.then(|| io.own::<L::Scalar>(ADDED_MASS - missing));
+        let (solid, hexes) = (io.uints(slot!(Self::SLOTS, "solid_slots")), io.scalars(slot!(Self::SLOTS, "hex_force")));
+        let (thread, beams) =
+            (io.uints(slot!(Self::SLOTS, "thread_slots")), io.scalars(slot!(Self::SLOTS, "beam_force")));
+        let bends = BENDING.then(|| {
+            let slots = io.uints(slot!(Self::SLOTS, "bend_slots", BENDING));
+            (slots, io.scalars(slot!(Self::SLOTS, "bend_force", BENDING)))
+        });
+        let masses = io.scalars(slot!(Self::SLOTS, "mass"));
+        let true_masses = if GRAVITY { io.scalars(slot!(Self::SLOTS, "true_mass", GRAVITY)) } else { &[] };
+        let mut acceleration = io.own::<L::Scalar>(slot!(Self::SLOTS, "acceleration"));
+        let mut inverse = io.own::<L::Scalar>(slot!(Self::SLOTS, "inverse_mass"));
+        let mut contact_force = CONTACT.then(|| io.own::<i32>(slot!(Self::SLOTS, "contact_force", CONTACT)));
+        let mut contact_stiffness = CONTACT.then(|| io.own::<i32>(slot!(Self::SLOTS, "contact_stiffness", CONTACT)));
+        let elements = if MASS_ADDED { io.scalars(slot!(Self::SLOTS, "element_stiffness", MASS_ADDED)) } else { &[] };
+        let mut added =
+            MASS_ADDED.then(|| io.own::<L::Scalar>(slot!(Self::SLOTS, "added_mass", CONTACT && MASS_ADDED)));
         let zero = L::Scalar::from_f64(0.0);
         let real = |x: f32| L::Scalar::from_f64(f64::from(x));
         let reach = real(params.mass_factor * 0.25) * io.row.dt * io.row.dt;
@@ -163,7 +169,8 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
                     *added = needed.max(*added * real(params.mass_memory));
                     mass = mass + *added;
                 } else if contact > zero {
-                    raise(&io.atomic_uints(STATUS - missing)[CONTACT_RATE], contact / mass);
+                    let status = io.atomic_uints(slot!(Self::SLOTS, "status", CONTACT && !MASS_ADDED));
+                    raise(&status[CONTACT_RATE], contact / mass);
                 }
             }
             let inverse_mass = L::Scalar::from_f64(1.0) / mass;

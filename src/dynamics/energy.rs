@@ -1,10 +1,12 @@
 //! Energies that no force computes: kinetic energy, and that of stretched threads, as [totals](super::totals).
 
 use super::totals::{add_up, part};
-use crate::elements::beam2::TABLE;
+use crate::elements::beam2::{self, TABLE};
+use crate::kernel::buffer::Kind::{Int, Scalar};
+use crate::kernel::interface::{Slot, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
-use crate::kernel::position::QUANTUM;
+use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, Share, when};
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{add, apply, dot};
@@ -25,10 +27,6 @@ pub struct Params {
     pub centre: [i32; 3],
 }
 
-pub const VELOCITY: usize = 0;
-pub const MASS: usize = 1;
-pub const REFERENCE: usize = 2;
-
 /// ½ Σ m v²; with `TOTAL`, v includes the affine motion Ḟ̄ (X − X_c), seen from the centre of mass.
 pub struct Kinetic<const TOTAL: bool>;
 
@@ -37,21 +35,28 @@ impl<const TOTAL: bool> Kernel for Kinetic<TOTAL> {
         // only a periodic cell deforms as a whole
         defines: &[when(TOTAL, "TOTAL"), when(TOTAL, "PERIODIC")],
         share: Share::Workgroups(1),
+        constants: &[&position::CONSTANTS],
         ..Shader::new("dynamics/energy", "kinetic")
     };
+    const SLOTS: &'static [Slot] = &[
+        Slot::read("velocity", Scalar),
+        Slot::read("mass", Scalar),
+        Slot::read("reference", Int).when(TOTAL),
+        Slot::scatter("totals", Scalar),
+    ];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();
-        let (velocity, mass) = (Field::new(io, VELOCITY), io.scalars(MASS));
+        let (velocity, mass) = (Field::new(io, slot!(Self::SLOTS, "velocity")), io.scalars(slot!(Self::SLOTS, "mass")));
         let plane = mass.len();
         let (half, quantum) = (L::Scalar::from_f64(0.5), L::Scalar::from_f64(QUANTUM));
-        let mut totals = io.scatter::<L::Scalar>(if TOTAL { 3 } else { 2 });
+        let mut totals = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "totals"));
         for item in items {
             let sum = add_up(part(item, params.length, params.count), |node| {
                 let mut v = velocity.at(node);
                 if TOTAL {
-                    let reference = io.ints(REFERENCE);
+                    let reference = io.ints(slot!(Self::SLOTS, "reference", TOTAL));
                     let x = [0, 1, 2].map(|k| {
                         L::Scalar::from_i32(reference[node + k * plane].wrapping_sub(params.centre[k])) * quantum
                     });
@@ -64,21 +69,24 @@ impl<const TOTAL: bool> Kernel for Kinetic<TOTAL> {
     }
 }
 
-pub const TENSION: usize = 0;
-pub const BEAMS: usize = 1;
-
 /// ½ Σ N² L₀/EA of beams.
 pub struct Axial;
 
 impl Kernel for Axial {
-    const SHADER: Shader = Shader { share: Share::Workgroups(1), ..Shader::new("dynamics/energy", "axial") };
+    const SHADER: Shader = Shader {
+        share: Share::Workgroups(1),
+        constants: &[&beam2::CONSTANTS],
+        ..Shader::new("dynamics/energy", "axial")
+    };
+    const SLOTS: &'static [Slot] =
+        &[Slot::read("tension", Scalar), Slot::read("beams", Scalar), Slot::scatter("totals", Scalar)];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();
-        let (tension, beams) = (io.scalars(TENSION), io.scalars(BEAMS));
+        let (tension, beams) = (io.scalars(slot!(Self::SLOTS, "tension")), io.scalars(slot!(Self::SLOTS, "beams")));
         let half = L::Scalar::from_f64(0.5);
-        let mut totals = io.scatter::<L::Scalar>(2);
+        let mut totals = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "totals"));
         for item in items {
             let sum = add_up(part(item, params.length, params.count), |beam| {
                 let (length, stiffness) = (beams[TABLE * beam + 3], beams[TABLE * beam + 4]);

@@ -14,9 +14,11 @@
 //! The sweep runs along a group of up to sixteen lines at once, one line a lane. The WGSL twin gives each line a workgroup and
 //! solves the same system, bordered by its last row, by parallel cyclic reduction.
 
-use crate::elements::LANES;
+use crate::elements::{self, LANES};
+use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
+use crate::kernel::interface::{Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
-use crate::kernel::position::QUANTUM;
+use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, Share, when};
 use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
@@ -40,7 +42,7 @@ pub struct Group {
 }
 
 /// Integers of a group in the table.
-pub const GROUP: usize = 6;
+const GROUP: usize = size_of::<Group>() / 4;
 
 /// Constants of the stage.
 #[repr(C)]
@@ -50,16 +52,18 @@ pub struct Params {
     pub beta: f32,
 }
 
-pub const GROUPS: usize = 0;
-/// Axial stiffness at rest of the segment that starts at a node, N/mm; 0 for none.
-pub const STIFFNESS: usize = 1;
-pub const REFERENCE: usize = 2;
-pub const QUANTA: usize = 3;
-pub const REMAINDER: usize = 4;
-pub const ACCELERATION: usize = 5;
-pub const INVERSE_MASS: usize = 6;
-/// Change of acceleration, mm/s² (3 planes).
-const CORRECTION: usize = 7;
+const SLOTS: [Slot; 8] = [
+    Slot::read("groups", Uint),
+    // axial stiffness at rest of the segment that starts at a node, N/mm; 0 for none
+    Slot::read("stiffness", Scalar),
+    Slot::read("reference", Int),
+    Slot::read("quanta", Int),
+    Slot::read("remainder", Scalar),
+    Slot::read("acceleration", Scalar),
+    Slot::read("inverse_mass", Scalar),
+    // change of acceleration, mm/s² (3 planes)
+    Slot::scatter("correction", Scalar),
+];
 
 /// The correction of accelerations; with `PERIODIC` lines deform with F̄ and may close through the cell.
 pub struct FibreLines<const PERIODIC: bool>;
@@ -84,12 +88,14 @@ impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
         defines: &[when(PERIODIC, "PERIODIC")],
         // a workgroup for each line
         share: Share::Workgroups(LANES),
+        constants: &[&elements::CONSTANTS, &position::CONSTANTS, &constants![uint: GROUP]],
         ..Shader::new("dynamics/fibre_lines", "fibre_lines")
     };
+    const SLOTS: &'static [Slot] = &SLOTS;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let groups: &[Group] = bytemuck::cast_slice(io.uints(GROUPS));
+        let groups: &[Group] = bytemuck::cast_slice(io.uints(slot!(&SLOTS, "groups")));
         // taken out rather than borrowed in a closure, which would not be compiled for the instruction set
         let mut memory = SCRATCH.take();
         for group in items {
@@ -115,9 +121,10 @@ fn place(station: usize, row: usize) -> usize {
 /// Brings segment vectors, accelerations and inverse masses into working memory, one line a lane.
 #[inline(always)]
 fn gather<L: Lane, const PERIODIC: bool>(io: &Io<L::Scalar>, group: &Group, scratch: &mut [L::Scalar]) {
-    let (reference, quanta, remainder) = (io.ints(REFERENCE), io.ints(QUANTA), io.scalars(REMAINDER));
-    let (acceleration, inverse, stiffness) =
-        (io.scalars(ACCELERATION), io.scalars(INVERSE_MASS), io.scalars(STIFFNESS));
+    let reference = io.ints(slot!(&SLOTS, "reference"));
+    let (quanta, remainder) = (io.ints(slot!(&SLOTS, "quanta")), io.scalars(slot!(&SLOTS, "remainder")));
+    let acceleration = io.scalars(slot!(&SLOTS, "acceleration"));
+    let (inverse, stiffness) = (io.scalars(slot!(&SLOTS, "inverse_mass")), io.scalars(slot!(&SLOTS, "stiffness")));
     let plane = inverse.len();
     let n = group.stations as usize;
     let g = &io.row.gradient;
@@ -279,8 +286,8 @@ fn eliminate<L: Lane>(n: usize, s: &mut Sweep<L::Scalar>) {
 
 /// Writes the corrections of a group's nodes.
 fn scatter<R: Real>(io: &Io<R>, group: &Group, scratch: &[R]) {
-    let mut correction = io.scatter::<R>(CORRECTION);
-    let plane = io.scalars(INVERSE_MASS).len();
+    let mut correction = io.scatter::<R>(slot!(&SLOTS, "correction"));
+    let plane = io.scalars(slot!(&SLOTS, "inverse_mass")).len();
     let n = group.stations as usize;
     for lane in 0..group.lines as usize {
         for i in 0..n {

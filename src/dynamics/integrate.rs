@@ -4,8 +4,10 @@
 //! v⁺ = ((1 − α dt/2) v⁻ + a dt)/(1 + α dt/2), then w⁺ = w + v⁺ dt. Work is taken with the mean velocity (v⁻ + v⁺)/2, for which
 //! the change of kinetic energy is exactly the work of all forces. Only what a scene has is computed, and its work kept.
 
+use crate::kernel::buffer::Kind::{Int, Scalar};
+use crate::kernel::interface::{Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
-use crate::kernel::position::carry;
+use crate::kernel::position::{self, carry};
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
@@ -20,22 +22,6 @@ pub struct Params {
     /// Gravity, mm/s².
     pub gravity: [f32; 3],
 }
-
-pub const ACCELERATION: usize = 0;
-/// Only if some work is kept; without it, what follows is one number earlier.
-pub const MASS: usize = 1;
-/// Only with `MASS_ADDED`; without it, what follows is one number earlier.
-pub const INVERSE_MASS: usize = 2;
-/// Only with `LINES`; without it, what follows is one number earlier.
-pub const CORRECTION: usize = 3;
-/// Only with `GRAVITY`; without it, what follows is one number earlier.
-pub const TRUE_MASS: usize = 4;
-/// The first write: velocity, mm/s (3 planes).
-const VELOCITY: usize = 5;
-const QUANTA: usize = 6;
-const REMAINDER: usize = 7;
-/// Works, mJ, a plane each, see [`Works`].
-const WORK: usize = 8;
 
 /// What changes the energy of nodes as they are integrated. Each has a plane in the work buffer, in this order.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -53,8 +39,18 @@ impl Works {
         const fn plane(is_there: bool, number: usize) -> Option<usize> {
             if is_there { Some(number) } else { None }
         }
-        let (inertia, gravity) = (self.damping as usize, self.damping as usize + self.inertia as usize);
+        let (inertia, gravity) = (self.before_inertia(), self.before_gravity());
         [plane(self.damping, 0), plane(self.inertia, inertia), plane(self.gravity, gravity)]
+    }
+
+    /// Planes before that of inertia.
+    const fn before_inertia(self) -> usize {
+        self.damping as usize
+    }
+
+    /// Planes before that of gravity.
+    const fn before_gravity(self) -> usize {
+        self.damping as usize + self.inertia as usize
     }
 
     /// How many there are.
@@ -66,6 +62,12 @@ impl Works {
 /// Integration; with `LINES`, the correction of fibre lines is added first; with `GRAVITY` the work of weight is kept; with
 /// `MASS_ADDED` the mass that acts may be more than that of the node.
 pub struct Integrate<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADDED: bool>;
+
+impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADDED: bool>
+    Integrate<LINES, GRAVITY, DAMPING, MASS_ADDED>
+{
+    const WORKS: Works = Works { damping: DAMPING, inertia: LINES || MASS_ADDED, gravity: GRAVITY };
+}
 
 /// Factors on the old velocity and on the acceleration.
 #[inline(always)]
@@ -88,30 +90,45 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
             when(DAMPING, "DAMPING"),
             when(MASS_ADDED, "MASS_ADDED"),
             when(LINES || MASS_ADDED, "INERTIA"),
-            when(LINES || GRAVITY || DAMPING || MASS_ADDED, "WORKS"),
+            when(Self::WORKS.count() > 0, "WORKS"),
+        ],
+        constants: &[
+            &position::CONSTANTS,
+            &constants![uint: INERTIA_PLANE = Self::WORKS.before_inertia(), GRAVITY_PLANE = Self::WORKS.before_gravity()],
         ],
         ..Shader::new("dynamics/integrate", "integrate")
     };
+    const SLOTS: &'static [Slot] = &[
+        Slot::read("acceleration", Scalar),
+        Slot::read("mass", Scalar).when(Self::WORKS.count() > 0),
+        Slot::read("inverse_mass", Scalar).when(MASS_ADDED),
+        Slot::read("correction", Scalar).when(LINES),
+        Slot::read("true_mass", Scalar).when(GRAVITY),
+        // mm/s
+        Slot::planes("velocity", Scalar, 3),
+        Slot::planes("quanta", Int, 3),
+        Slot::planes("remainder", Scalar, 3),
+        // mJ, a plane each, see [`Works`]
+        Slot::planes("work", Scalar, Self::WORKS.count()).when(Self::WORKS.count() > 0),
+    ];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let works = const { Works { damping: DAMPING, inertia: LINES || MASS_ADDED, gravity: GRAVITY } };
+        let works = Self::WORKS;
         let [damped_plane, inertia_plane, fallen_plane] = works.planes();
         let params: Params = io.params();
-        let acceleration = io.scalars(ACCELERATION);
+        let acceleration = io.scalars(slot!(Self::SLOTS, "acceleration"));
         let plane = acceleration.len() / 3;
-        let massless = usize::from(works.count() == 0);
-        let masses = if works.count() > 0 { io.scalars(MASS) } else { &[] };
-        let unchanged = massless + usize::from(!MASS_ADDED);
-        let inverse = if MASS_ADDED { io.scalars(INVERSE_MASS - massless) } else { &[] };
-        let correction = if LINES { io.scalars(CORRECTION - unchanged) } else { &[] };
-        let straight = unchanged + usize::from(!LINES);
-        let true_masses = if GRAVITY { io.scalars(TRUE_MASS - straight) } else { &[] };
-        let missing = straight + usize::from(!GRAVITY);
-        let mut velocity = io.own::<L::Scalar>(VELOCITY - missing);
-        let mut quanta = io.own::<i32>(QUANTA - missing);
-        let mut remainder = io.own::<L::Scalar>(REMAINDER - missing);
-        let mut kept = (works.count() > 0).then(|| io.own::<L::Scalar>(WORK - missing));
+        let masses =
+            if works.count() > 0 { io.scalars(slot!(Self::SLOTS, "mass", Self::WORKS.count() > 0)) } else { &[] };
+        let inverse = if MASS_ADDED { io.scalars(slot!(Self::SLOTS, "inverse_mass", MASS_ADDED)) } else { &[] };
+        let correction = if LINES { io.scalars(slot!(Self::SLOTS, "correction", LINES)) } else { &[] };
+        let true_masses = if GRAVITY { io.scalars(slot!(Self::SLOTS, "true_mass", GRAVITY)) } else { &[] };
+        let mut velocity = io.own::<L::Scalar>(slot!(Self::SLOTS, "velocity"));
+        let mut quanta = io.own::<i32>(slot!(Self::SLOTS, "quanta"));
+        let mut remainder = io.own::<L::Scalar>(slot!(Self::SLOTS, "remainder"));
+        let mut kept =
+            (works.count() > 0).then(|| io.own::<L::Scalar>(slot!(Self::SLOTS, "work", Self::WORKS.count() > 0)));
         let row = io.row;
         let solid = factors::<_, DAMPING>(row.damping_solid, row.dt_mid);
         let thread = factors::<_, DAMPING>(row.damping_thread, row.dt_mid);

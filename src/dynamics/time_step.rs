@@ -19,16 +19,17 @@
 //! A bend of energy S (T − T₀)², T = tan(θ/2), is (1 + T²)(1 + T² + 2 T (T − T₀)) times as stiff as one that is straight. T comes
 //! from its force on a beam of length l, S (T − T₀)(1 + T²)/l, and its energy.
 
+use super::assemble::{self, BENT, NONE, SOLID, THREAD};
+use crate::elements::beam2::{self, TABLE};
+use crate::elements::bend::{self, BEND};
+use crate::kernel::buffer::Kind::{Scalar, Uint};
+use crate::kernel::interface::{Constant, Slot, constants, joined, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::norm;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
-
-use super::assemble::{BENT, NONE, SOLID, THREAD};
-use crate::elements::beam2::TABLE;
-use crate::elements::bend::BEND;
 
 /// Constants of the stage.
 #[repr(C)]
@@ -42,24 +43,23 @@ pub struct Params {
     pub axial: f32,
 }
 
-/// For each solid node, where its corner bounds are.
-const SOLID_BOUNDS: usize = 0;
-const HEX_BOUND: usize = 1;
-/// Axial stiffness of closed lines that are too short for fibre lines, N/mm.
-const CONSTANT: usize = 2;
-/// Slots of thread nodes, forces of beams and their table.
-const THREAD_SLOTS: usize = 3;
-const BEAM_FORCE: usize = 4;
-const BEAMS: usize = 5;
-/// With `BENDING`: bends of thread nodes; their table, energies and forces, and their row sums.
-const BEND_SLOTS: usize = 6;
-const BENDS: usize = 7;
-const BEND_ENERGY: usize = 8;
-const BEND_FORCE: usize = 9;
-const BEND_ROWS: usize = 10;
-/// What comes next with `BENDING`, and without.
-const fn next(bending: bool) -> usize {
-    if bending { 11 } else { 6 }
+/// What row sums are assembled from, with `bending` also that of bends.
+const fn rows(bending: bool) -> [Slot; 11] {
+    [
+        // for each solid node, where its corner bounds are
+        Slot::read("solid_bounds", Uint),
+        Slot::read("hex_bound", Scalar),
+        // axial stiffness of closed lines that are too short for fibre lines, N/mm
+        Slot::read("constant", Scalar),
+        Slot::read("thread_slots", Uint),
+        Slot::read("beam_force", Scalar),
+        Slot::read("beams", Scalar),
+        Slot::read("bend_slots", Uint).when(bending),
+        Slot::read("bends", Scalar).when(bending),
+        Slot::read("bend_energy", Scalar).when(bending),
+        Slot::read("bend_force", Scalar).when(bending),
+        Slot::read("bend_rows", Scalar).when(bending),
+    ]
 }
 /// Numbers of a bend's row sums: of its three nodes while it is straight, N/mm; length of its first beam, mm.
 pub const ROWS: usize = 4;
@@ -71,6 +71,10 @@ pub fn left(beta: f64) -> f64 {
 
 /// Difference of T and T₀ below which they count as equal.
 const AT_REST: f64 = 1e-3;
+
+/// What the twin takes from Rust.
+const CONSTANTS: &[&[Constant]] =
+    &[&beam2::CONSTANTS, &bend::CONSTANTS, &assemble::CONSTANTS, &constants![uint: ROWS; scalar: AT_REST]];
 
 /// How much stiffer a bend is than a straight one.
 #[inline(always)]
@@ -118,18 +122,18 @@ impl<'a, R: Real> RowSums<'a, R> {
         Self {
             first_thread: params.first_thread as usize,
             axial: R::from_f64(f64::from(params.axial)),
-            slots: io.uints(SOLID_BOUNDS),
-            bounds: io.scalars(HEX_BOUND),
-            constant: io.scalars(CONSTANT),
-            thread: io.uints(THREAD_SLOTS),
-            forces: io.scalars(BEAM_FORCE),
-            beams: io.scalars(BEAMS),
+            slots: io.uints(slot!(&rows(false), "solid_bounds")),
+            bounds: io.scalars(slot!(&rows(false), "hex_bound")),
+            constant: io.scalars(slot!(&rows(false), "constant")),
+            thread: io.uints(slot!(&rows(false), "thread_slots")),
+            forces: io.scalars(slot!(&rows(false), "beam_force")),
+            beams: io.scalars(slot!(&rows(false), "beams")),
             bends: BENDING.then(|| Bends {
-                slots: io.uints(BEND_SLOTS),
-                table: io.scalars(BENDS),
-                energy: io.scalars(BEND_ENERGY),
-                force: io.scalars(BEND_FORCE),
-                rows: io.scalars(BEND_ROWS),
+                slots: io.uints(slot!(&rows(true), "bend_slots")),
+                table: io.scalars(slot!(&rows(true), "bends")),
+                energy: io.scalars(slot!(&rows(true), "bend_energy")),
+                force: io.scalars(slot!(&rows(true), "bend_force")),
+                rows: io.scalars(slot!(&rows(true), "bend_rows")),
             }),
             weights,
         }
@@ -196,17 +200,27 @@ pub struct WeighedLimit<const BENDING: bool>;
 impl<const BENDING: bool, const MASS_ADDED: bool> Kernel for ElementLimit<BENDING, MASS_ADDED> {
     const SHADER: Shader = Shader {
         defines: &[when(BENDING, "BENDING"), when(MASS_ADDED, "MASS_ADDED")],
+        constants: CONSTANTS,
         ..Shader::new("dynamics/time_step", "element_limit")
     };
+    const SLOTS: &'static [Slot] = &joined::<14>(
+        &rows(BENDING),
+        &[
+            Slot::read("mass", Scalar),
+            Slot::read("added_mass", Scalar).when(MASS_ADDED),
+            // row sums, N/mm, and R/m, 1/s²
+            Slot::planes("limit", Scalar, 2),
+        ],
+    );
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();
         let least = L::Scalar::from_f64(f64::from(params.mass_per_stiffness));
         let rows = RowSums::new::<BENDING>(io, params, None);
-        let masses = io.scalars(next(BENDING));
-        let added = MASS_ADDED.then(|| io.scalars(next(BENDING) + 1));
-        let mut limits = io.own::<L::Scalar>(next(BENDING) + 1 + usize::from(MASS_ADDED));
+        let masses = io.scalars(slot!(Self::SLOTS, "mass"));
+        let added = MASS_ADDED.then(|| io.scalars(slot!(Self::SLOTS, "added_mass", MASS_ADDED)));
+        let mut limits = io.own::<L::Scalar>(slot!(Self::SLOTS, "limit"));
         for node in items {
             let k = rows.of(node);
             *limits.at(0, node) = k;
@@ -217,17 +231,29 @@ impl<const BENDING: bool, const MASS_ADDED: bool> Kernel for ElementLimit<BENDIN
 }
 
 impl<const BENDING: bool> Kernel for WeighedLimit<BENDING> {
-    const SHADER: Shader =
-        Shader { defines: &[when(BENDING, "BENDING")], ..Shader::new("dynamics/time_step", "weighed_limit") };
+    const SHADER: Shader = Shader {
+        defines: &[when(BENDING, "BENDING")],
+        constants: CONSTANTS,
+        ..Shader::new("dynamics/time_step", "weighed_limit")
+    };
+    const SLOTS: &'static [Slot] = &joined::<15>(
+        &rows(BENDING),
+        &[
+            Slot::read("limit", Scalar),
+            Slot::read("ends", Uint),
+            Slot::read("pairs", Uint).when(BENDING),
+            Slot::row("out", Scalar, 1),
+        ],
+    );
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let limits = io.scalars(next(BENDING));
+        let limits = io.scalars(slot!(Self::SLOTS, "limit"));
         let (sums, rates) = limits.split_at(limits.len() / 2);
-        let pairs = if BENDING { io.uints(next(BENDING) + 2) } else { &[] };
-        let weights = Weights { rates, ends: io.uints(next(BENDING) + 1), pairs };
+        let pairs = if BENDING { io.uints(slot!(Self::SLOTS, "pairs", BENDING)) } else { &[] };
+        let weights = Weights { rates, ends: io.uints(slot!(Self::SLOTS, "ends")), pairs };
         let rows = RowSums::new::<BENDING>(io, io.params(), Some(weights));
-        let mut out = io.own::<L::Scalar>(next(BENDING) + 2 + usize::from(BENDING));
+        let mut out = io.own::<L::Scalar>(slot!(Self::SLOTS, "out"));
         let zero = L::Scalar::from_f64(0.0);
         for node in items {
             // nodes that are held stay out
@@ -237,12 +263,13 @@ impl<const BENDING: bool> Kernel for WeighedLimit<BENDING> {
 }
 
 impl Kernel for HeldLimit {
-    const SHADER: Shader = Shader::new("dynamics/time_step", "held_limit");
+    const SHADER: Shader = Shader { constants: CONSTANTS, ..Shader::new("dynamics/time_step", "held_limit") };
+    const SLOTS: &'static [Slot] = &[Slot::read("conditions", Uint), Slot::scatter("limit", Scalar)];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let conditions = io.uints(0);
-        let mut limits = io.scatter::<L::Scalar>(1);
+        let conditions = io.uints(slot!(Self::SLOTS, "conditions"));
+        let mut limits = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "limit"));
         let plane = limits.len() / 2;
         for item in items.filter(|item| conditions[2 * item + 1] == 7) {
             limits.set(plane + conditions[2 * item] as usize, L::Scalar::from_f64(0.0));

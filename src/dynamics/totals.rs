@@ -5,9 +5,11 @@
 //! invocations takes every 64th number, then the upper half is added to the lower until one sum is left. The CPU keeps the
 //! same sums side by side. The host adds the parts in f64.
 
-use crate::elements::LANES;
+use crate::elements::{self, LANES};
+use crate::kernel::buffer::Kind::{Scalar, Uint};
+use crate::kernel::interface::{Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
-use crate::kernel::shader::{Shader, Share, WORKGROUP};
+use crate::kernel::shader::{Shader, Share, WORKGROUP, when};
 use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
@@ -95,29 +97,30 @@ impl Params {
     }
 }
 
-pub const SOURCE: usize = 0;
-
 /// Sums of columns, the columns of a part side by side; with `TAKEN` the numbers are set back to zero.
 pub struct Sum<const TAKEN: bool>;
 
 impl<const TAKEN: bool> Kernel for Sum<TAKEN> {
     const SHADER: Shader = Shader {
-        defines: if TAKEN { &["TAKEN"] } else { &[] },
+        defines: &[when(TAKEN, "TAKEN")],
         share: Share::Workgroups(1),
         ..Shader::new("dynamics/totals", "sum")
     };
+    const SLOTS: &'static [Slot] = &[
+        if TAKEN { Slot::scatter("source", Scalar) } else { Slot::read("source", Scalar) },
+        Slot::scatter("totals", Scalar),
+    ];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        const TOTALS: usize = 1;
         let params: Params = io.params();
         let columns = params.columns as usize;
-        let mut totals = io.scatter::<L::Scalar>(TOTALS);
+        let mut totals = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "totals"));
         for item in items {
             let (number, column) = (item / columns, item % columns);
             let part = part(number, params.length, params.count);
             let sum = if TAKEN {
-                let mut source = io.scatter::<L::Scalar>(SOURCE);
+                let mut source = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "source"));
                 add_up(part, |number| {
                     let place = params.place(number, column);
                     let value = source.get(place);
@@ -125,7 +128,7 @@ impl<const TAKEN: bool> Kernel for Sum<TAKEN> {
                     value
                 })
             } else {
-                let source = io.scalars(SOURCE);
+                let source = io.scalars(slot!(Self::SLOTS, "source"));
                 add_up(part, |number| source[params.place(number, column)])
             };
             totals.set(params.into as usize + item, sum);
@@ -141,22 +144,27 @@ pub struct Worst<const JACOBIAN: bool>;
 
 impl<const JACOBIAN: bool> Kernel for Worst<JACOBIAN> {
     const SHADER: Shader = Shader {
-        defines: if JACOBIAN { &["JACOBIAN"] } else { &[] },
+        defines: &[when(JACOBIAN, "JACOBIAN")],
         share: Share::Workgroups(1),
+        constants: &[&elements::CONSTANTS, &constants![uint: WORST; scalar: LOWEST]],
         ..Shader::new("dynamics/totals", "worst")
     };
+    const SLOTS: &'static [Slot] = &[
+        Slot::read("source", Scalar),
+        // of each block of hexahedra
+        Slot::read("lanes_used", Uint).when(JACOBIAN),
+        Slot::scatter("totals", Scalar),
+    ];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        /// Lanes in use of each block of hexahedra.
-        const LANES_USED: usize = 1;
         let params: Params = io.params();
-        let source = io.scalars(SOURCE);
-        let mut totals = io.scatter::<L::Scalar>(if JACOBIAN { 2 } else { 1 });
+        let source = io.scalars(slot!(Self::SLOTS, "source"));
+        let mut totals = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "totals"));
         for item in items {
             let part = part(item, params.length, params.count);
             let (value, place) = if JACOBIAN {
-                let used = io.uints(LANES_USED);
+                let used = io.uints(slot!(Self::SLOTS, "lanes_used", JACOBIAN));
                 let in_use = |number: usize| number % LANES < used[number / LANES] as usize;
                 let lowest = L::Scalar::from_f64(LOWEST);
                 largest(part, |n| if in_use(n) { -source[params.place(n, 0)] } else { lowest })

@@ -3,8 +3,11 @@
 //! The strain is formed from the change of the beam's vector, ε = (2 D·δ + δ·δ)/(L₀ (l + L₀)) with d = D + δ, which keeps its
 //! relative accuracy at small strain.
 
+use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
+use crate::kernel::interface::{Constant, Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Displacements;
+use crate::kernel::position;
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{add, apply, dot, norm, scale};
@@ -13,21 +16,11 @@ use std::ops::Range;
 /// Numbers of a beam in the table: vector D in mm (3), length L₀ in mm, EA in N.
 pub const TABLE: usize = 5;
 
-pub const ENDS: usize = 0;
-pub const BEAMS: usize = 1;
-pub const QUANTA: usize = 2;
-pub const REMAINDER: usize = 3;
-/// Thermal strain, only with `THERMAL`; without it, all writes are one number earlier.
-pub const THERMAL_STRAIN: usize = 4;
-/// Force along the beam, on its first node, N (3); the second node gets the opposite.
-const FORCE: usize = 5;
-/// Axial force N, in N.
-const TENSION: usize = 6;
-/// Sum of force ⊗ D over steps, N·mm (9), for periodic scenes.
-const VIRIAL: usize = 7;
+/// What twins know of beams.
+pub const CONSTANTS: [Constant; 1] = constants![uint: TABLE];
 
 /// Axial forces; with `PERIODIC`, also their part of the homogenised stress; with `THERMAL`, of strained threads, also the
-/// thermal work −∫ N L₀ dε_th, mJ, which is written last.
+/// thermal work −∫ N L₀ dε_th, mJ.
 pub struct Beam2<const PERIODIC: bool, const THERMAL: bool>;
 
 /// A beam's reference vector and its change, mm.
@@ -58,19 +51,35 @@ pub fn add_virial<R: Real>(to: &mut [R], force: [R; 3], reference: [R; 3]) {
 impl<const PERIODIC: bool, const THERMAL: bool> Kernel for Beam2<PERIODIC, THERMAL> {
     const SHADER: Shader = Shader {
         defines: &[when(PERIODIC, "PERIODIC"), when(THERMAL, "THERMAL")],
+        constants: &[&position::CONSTANTS, &CONSTANTS],
         ..Shader::new("elements/beam2", "force")
     };
+    const SLOTS: &'static [Slot] = &[
+        Slot::read("ends", Uint),
+        Slot::read("beams", Scalar),
+        Slot::read("quanta", Int),
+        Slot::read("remainder", Scalar),
+        Slot::read("thermal_strain", Scalar).when(THERMAL),
+        // force along the beam, on its first node, N; the second node gets the opposite
+        Slot::row("forces", Scalar, 3),
+        // axial force N, in N
+        Slot::row("tensions", Scalar, 1),
+        // sum of force ⊗ D over steps, N·mm
+        Slot::row("virial", Scalar, 9).when(PERIODIC),
+        Slot::row("work", Scalar, 1).when(THERMAL),
+    ];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let w = Displacements::new(io, QUANTA, REMAINDER);
-        let (ends, table) = (io.uints(ENDS), io.scalars(BEAMS));
-        let missing = usize::from(!THERMAL);
-        let mut forces = io.own::<L::Scalar>(FORCE - missing);
-        let mut tensions = io.own::<L::Scalar>(TENSION - missing);
-        let mut virials = PERIODIC.then(|| io.own::<L::Scalar>(VIRIAL - missing));
-        let mut thermal =
-            THERMAL.then(|| (io.scalars(THERMAL_STRAIN), io.own::<L::Scalar>(VIRIAL + usize::from(PERIODIC))));
+        let w = Displacements::new(io, slot!(Self::SLOTS, "quanta"), slot!(Self::SLOTS, "remainder"));
+        let (ends, table) = (io.uints(slot!(Self::SLOTS, "ends")), io.scalars(slot!(Self::SLOTS, "beams")));
+        let mut forces = io.own::<L::Scalar>(slot!(Self::SLOTS, "forces"));
+        let mut tensions = io.own::<L::Scalar>(slot!(Self::SLOTS, "tensions"));
+        let mut virials = PERIODIC.then(|| io.own::<L::Scalar>(slot!(Self::SLOTS, "virial", PERIODIC)));
+        let mut thermal = THERMAL.then(|| {
+            let strains = io.scalars(slot!(Self::SLOTS, "thermal_strain", THERMAL));
+            (strains, io.own::<L::Scalar>(slot!(Self::SLOTS, "work", THERMAL)))
+        });
         let two = L::Scalar::from_f64(2.0);
         for beam in items {
             let (reference, change) = vector::<_, PERIODIC>(table, ends, beam, &w, &io.row.gradient);

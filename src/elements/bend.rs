@@ -4,9 +4,12 @@
 //! none: it would lose its stiffness. Only the size of the rest curvature is kept, not its plane: a thread has no torsional
 //! stiffness here.
 
-use super::beam2::{TABLE, add_virial, vector};
+use super::beam2::{self, TABLE, add_virial, vector};
+use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
+use crate::kernel::interface::{Constant, Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Displacements;
+use crate::kernel::position;
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{add, cross, dot, norm, scale, sub};
@@ -17,20 +20,8 @@ pub const BEND: usize = 2;
 /// Largest smoothing T_ε of tan(θ/2): 0.6 degrees of turning. It is at most half the smoothed rest value, so that the stiffness of a
 /// straightened bend is never below minus that of a straight one.
 pub const SMOOTHING: f64 = 0.005;
-
-/// Beams `[2]` of each bend.
-pub const PAIRS: usize = 0;
-pub const BENDS: usize = 1;
-pub const ENDS: usize = 2;
-pub const BEAMS: usize = 3;
-pub const QUANTA: usize = 4;
-pub const REMAINDER: usize = 5;
-/// Force along each of the two beams, on its first node, N (2 × 3); its second node gets the opposite.
-const FORCE: usize = 6;
-/// Energy, mJ.
-const ENERGY: usize = 7;
-/// Sum of force ⊗ D over steps, N·mm (9), for periodic scenes.
-const VIRIAL: usize = 8;
+/// What twins know of bends.
+pub const CONSTANTS: [Constant; 2] = constants![uint: BEND; scalar: SMOOTHING];
 
 /// Bending forces; with `PERIODIC`, also their part of the homogenised stress.
 pub struct Bend<const PERIODIC: bool>;
@@ -41,15 +32,35 @@ pub fn smoothed(t: f64) -> f64 {
 }
 
 impl<const PERIODIC: bool> Kernel for Bend<PERIODIC> {
-    const SHADER: Shader = Shader { defines: &[when(PERIODIC, "PERIODIC")], ..Shader::new("elements/bend", "force") };
+    const SHADER: Shader = Shader {
+        defines: &[when(PERIODIC, "PERIODIC")],
+        constants: &[&position::CONSTANTS, &beam2::CONSTANTS, &CONSTANTS],
+        ..Shader::new("elements/bend", "force")
+    };
+    const SLOTS: &'static [Slot] = &[
+        // beams (2) of each bend
+        Slot::read("pairs", Uint),
+        Slot::read("bends", Scalar),
+        Slot::read("ends", Uint),
+        Slot::read("beams", Scalar),
+        Slot::read("quanta", Int),
+        Slot::read("remainder", Scalar),
+        // force along each of the two beams, on its first node, N (2 × 3); its second node gets the opposite
+        Slot::row("forces", Scalar, 6),
+        // energy, mJ
+        Slot::row("energies", Scalar, 1),
+        // sum of force ⊗ D over steps, N·mm
+        Slot::row("virial", Scalar, 9).when(PERIODIC),
+    ];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let w = Displacements::new(io, QUANTA, REMAINDER);
-        let (pairs, bends, ends, table) = (io.uints(PAIRS), io.scalars(BENDS), io.uints(ENDS), io.scalars(BEAMS));
-        let mut forces = io.own::<L::Scalar>(FORCE);
-        let mut energies = io.own::<L::Scalar>(ENERGY);
-        let mut virials = PERIODIC.then(|| io.own::<L::Scalar>(VIRIAL));
+        let w = Displacements::new(io, slot!(Self::SLOTS, "quanta"), slot!(Self::SLOTS, "remainder"));
+        let (pairs, bends) = (io.uints(slot!(Self::SLOTS, "pairs")), io.scalars(slot!(Self::SLOTS, "bends")));
+        let (ends, table) = (io.uints(slot!(Self::SLOTS, "ends")), io.scalars(slot!(Self::SLOTS, "beams")));
+        let mut forces = io.own::<L::Scalar>(slot!(Self::SLOTS, "forces"));
+        let mut energies = io.own::<L::Scalar>(slot!(Self::SLOTS, "energies"));
+        let mut virials = PERIODIC.then(|| io.own::<L::Scalar>(slot!(Self::SLOTS, "virial", PERIODIC)));
         let constant = L::Scalar::from_f64;
         debug_assert!(table.len() % TABLE == 0);
         for bend in items {

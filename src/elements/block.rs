@@ -5,11 +5,14 @@
 //! enter as differences to the first corner. Corner order in registers is binary, `i + 2 j + 4 k` for (ξ, η, ζ).
 
 use super::LANES;
+use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
+use crate::kernel::interface::{Constant, Slot, constants, joined, slot};
 use crate::kernel::lane::{Lane, Real};
-use crate::kernel::position::difference;
+use crate::kernel::math;
+use crate::kernel::position::{self, difference};
 use crate::kernel::shader::{Shader, Share, when};
 use crate::kernel::stage::Io;
-use crate::materials::{Material, PARAMETERS, Tensor};
+use crate::materials::{self, Material, PARAMETERS, Tensor};
 use bytemuck::{Pod, Zeroable};
 use std::marker::PhantomData;
 
@@ -25,20 +28,43 @@ pub const BOUND: usize = 8 * LANES;
 /// Binary corner index of each corner in mesh order.
 pub const BINARY: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
 
+/// What twins know of blocks.
+pub const CONSTANTS: [Constant; 4] = constants![uint: SLOTS, VIRIAL, ENERGY, BOUND];
+
+/// What the element of a twin takes from Rust.
+pub trait Element: 'static {
+    const CONSTANTS: &'static [Constant];
+}
+
 /// The twin of a kernel of an element for a law, one lane an invocation.
-pub const fn shader<M: Material, const PERIODIC: bool>(file: &'static str, kernel: &'static str) -> Shader {
-    let defines = const { &[when(PERIODIC, "PERIODIC")] };
-    Shader { law: Some(M::SHADER), share: Share::Invocations(LANES), defines, ..Shader::new(file, kernel) }
+pub const fn shader<E: Element, M: Material, const PERIODIC: bool>(file: &'static str, kernel: &'static str) -> Shader {
+    Shader {
+        law: Some(M::SHADER),
+        share: Share::Invocations(LANES),
+        defines: const { &[when(PERIODIC, "PERIODIC")] },
+        constants: const {
+            &[
+                &super::CONSTANTS,
+                &position::CONSTANTS,
+                &math::CONSTANTS,
+                &materials::CONSTANTS,
+                M::CONSTANTS,
+                &CONSTANTS,
+                E::CONSTANTS,
+            ]
+        },
+        ..Shader::new(file, kernel)
+    }
 }
 
 /// The same for bounds, weighed or not.
-pub const fn weighed_shader<M: Material, const PERIODIC: bool, const WEIGHED: bool>(
+pub const fn weighed_shader<E: Element, M: Material, const PERIODIC: bool, const WEIGHED: bool>(
     file: &'static str,
     kernel: &'static str,
 ) -> Shader {
     Shader {
         defines: const { &[when(PERIODIC, "PERIODIC"), when(WEIGHED, "WEIGHED")] },
-        ..shader::<M, PERIODIC>(file, kernel)
+        ..shader::<E, M, PERIODIC>(file, kernel)
     }
 }
 
@@ -66,21 +92,31 @@ pub struct Params {
     pub left: f32,
 }
 
-/// Reads, in binding order.
-pub const HEADERS: usize = 0;
-pub const CORNERS: usize = 1;
-pub const QUANTA: usize = 2;
-pub const REMAINDER: usize = 3;
-pub const SHAPES: usize = 4;
-pub const FRAMES: usize = 5;
-pub const MATERIALS: usize = 6;
-/// The first write.
-pub const OUT: usize = 7;
-/// Of bounds that are weighed: R/m of nodes in the second plane, and then what they write.
-const WEIGHTS: usize = OUT;
-const WEIGHED_OUT: usize = OUT + 1;
-/// The stress sum, for periodic scenes.
-const OUT_VIRIAL: usize = 8;
+/// What all kernels of hexahedra read; displacements are quanta and remainder.
+const READS: [Slot; 7] = [
+    Slot::read("headers", Uint),
+    Slot::read("corners", Uint),
+    Slot::read("quanta", Int),
+    Slot::read("remainder", Scalar),
+    Slot::read("shapes", Scalar),
+    Slot::read("frames", Scalar),
+    Slot::read("materials", Scalar),
+];
+
+/// The slots of forces; the stress sum is for periodic scenes.
+pub const fn force_slots(periodic: bool) -> [Slot; 9] {
+    joined(&READS, &[Slot::row("out", Scalar, SLOTS), Slot::row("out_virial", Scalar, VIRIAL).when(periodic)])
+}
+
+/// The slots of energies; those of hourglass modes are for reduced integration.
+pub const fn energy_slots(reduced: bool) -> [Slot; 9] {
+    joined(&READS, &[Slot::row("out", Scalar, ENERGY), Slot::row("out_hourglass", Scalar, LANES).when(reduced)])
+}
+
+/// The slots of bounds; those that are weighed read R/m of nodes in the second plane of the weights.
+pub const fn bound_slots(weighed: bool) -> [Slot; 9] {
+    joined(&READS, &[Slot::read("weights", Scalar).when(weighed), Slot::row("out", Scalar, BOUND)])
+}
 
 /// A block and one register of its lanes.
 pub struct Lanes<'a, L: Lane> {
@@ -95,11 +131,12 @@ impl<'a, L: Lane> Lanes<'a, L> {
     /// The lanes of a block from `lane` on; a shape has `size` numbers.
     #[inline(always)]
     pub fn new(io: &'a Io<L::Scalar>, size: usize, block: usize, lane: usize) -> Self {
-        let header: Header = bytemuck::pod_read_unaligned(bytemuck::cast_slice(&io.uints(HEADERS)[4 * block..][..4]));
+        let header: Header =
+            bytemuck::pod_read_unaligned(bytemuck::cast_slice(&io.uints(slot!(&READS, "headers"))[4 * block..][..4]));
         Self {
             header,
-            corners: &io.uints(CORNERS)[8 * LANES * block..][..8 * LANES],
-            shape: &io.scalars(SHAPES)[size * header.shape as usize..][..size],
+            corners: &io.uints(slot!(&READS, "corners"))[8 * LANES * block..][..8 * LANES],
+            shape: &io.scalars(slot!(&READS, "shapes"))[size * header.shape as usize..][..size],
             lane,
             life: PhantomData,
         }
@@ -119,7 +156,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
 
     #[inline(always)]
     fn scalar_frame(&self, io: &Io<L::Scalar>) -> Tensor<L::Scalar> {
-        let q = &io.scalars(FRAMES)[9 * self.header.frame as usize..][..9];
+        let q = &io.scalars(slot!(&READS, "frames"))[9 * self.header.frame as usize..][..9];
         [[q[0], q[1], q[2]], [q[3], q[4], q[5]], [q[6], q[7], q[8]]]
     }
 
@@ -131,7 +168,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
 
     #[inline(always)]
     pub fn material(&self, io: &Io<L::Scalar>) -> [L; PARAMETERS] {
-        let row = &io.scalars(MATERIALS)[PARAMETERS * self.header.material as usize..][..PARAMETERS];
+        let row = &io.scalars(slot!(&READS, "materials"))[PARAMETERS * self.header.material as usize..][..PARAMETERS];
         let mut parameters = [L::splat(row[0]); PARAMETERS];
         for (parameter, value) in parameters.iter_mut().zip(row) {
             *parameter = L::splat(*value);
@@ -142,7 +179,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
     /// Displacements of the corners relative to the first, by component and binary corner.
     #[inline(always)]
     pub fn displacements(&self, io: &Io<L::Scalar>, nodes: usize) -> [[L; 8]; 3] {
-        let (quanta, remainder) = (io.ints(QUANTA), io.scalars(REMAINDER));
+        let (quanta, remainder) = (io.ints(slot!(&READS, "quanta")), io.scalars(slot!(&READS, "remainder")));
         let zero = L::Scalar::from_f64(0.0);
         let mut global = [[L::splat(zero); 8]; 3];
         for (component, row) in global.iter_mut().enumerate() {
@@ -182,7 +219,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
     pub fn weights<const WEIGHED: bool>(&self, io: &Io<L::Scalar>, nodes: usize) -> [L; 8] {
         let mut weights = [L::new(1.0); 8];
         if WEIGHED {
-            let limits = &io.scalars(WEIGHTS)[nodes..];
+            let limits = &io.scalars(slot!(&bound_slots(WEIGHED), "weights", WEIGHED))[nodes..];
             let mut buffer = [L::Scalar::from_f64(0.0); LANES];
             for (corner, &binary) in BINARY.iter().enumerate() {
                 let ids = &self.corners[corner * LANES + self.lane..][..L::WIDTH];
@@ -204,7 +241,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
     /// Writes the rows of stiffness of the binary corners of a block.
     #[inline(always)]
     pub fn store_rows<const WEIGHED: bool>(&self, io: &Io<L::Scalar>, block: usize, rows: &[L; 8]) {
-        let mut bounds = io.own::<L::Scalar>(if WEIGHED { WEIGHED_OUT } else { OUT });
+        let mut bounds = io.own::<L::Scalar>(slot!(&bound_slots(WEIGHED), "out"));
         let out = bounds.item(0, block);
         for (corner, &binary) in BINARY.iter().enumerate() {
             rows[binary].store(&mut out[corner * LANES + self.lane..]);
@@ -215,7 +252,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
     #[inline(always)]
     pub fn add_virial(&self, io: &Io<L::Scalar>, block: usize, q: &Tensor<L>, stress: &Tensor<L>) {
         let sum = turn(q, stress, true);
-        let mut virials = io.own::<L::Scalar>(OUT_VIRIAL);
+        let mut virials = io.own::<L::Scalar>(slot!(&force_slots(true), "out_virial"));
         let out = virials.item(0, block);
         for i in 0..3 {
             for j in 0..3 {

@@ -5,7 +5,10 @@
 //! fibre's frame first; in periodic scenes the macroscopic gradient F̄ − I is added to H.
 
 use super::LANES;
-use super::block::{BINARY, Lanes, OUT, Params, cross, dot, shader, total, weighed_shader};
+use super::block::{
+    BINARY, Element, Lanes, Params, bound_slots, cross, dot, energy_slots, force_slots, shader, total, weighed_shader,
+};
+use crate::kernel::interface::{Constant, Slot, constants, slot};
 use crate::kernel::lane::Lane;
 use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
@@ -25,6 +28,13 @@ const FAR: f64 = 0.211_324_865_405_187_13;
 
 /// Derivatives of three components with respect to (ξ, η, ζ), each at the four points of the other two directions.
 type Derivatives<L> = [[[L; 4]; 3]; 3];
+
+/// The element.
+pub struct Hex8;
+
+impl Element for Hex8 {
+    const CONSTANTS: &'static [Constant] = &constants![uint: SHAPE; scalar: NEAR, FAR];
+}
 
 /// Nodal forces of hexahedra; with `PERIODIC`, also the sum of stress for the homogenised first Piola stress.
 pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
@@ -299,12 +309,13 @@ impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
-    const SHADER: Shader = shader::<M, PERIODIC>("elements/hex8", "force");
+    const SHADER: Shader = shader::<Hex8, M, PERIODIC>("elements/hex8", "force");
+    const SLOTS: &'static [Slot] = &force_slots(PERIODIC);
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { nodes, .. } = io.params();
-        let mut slots = io.own::<L::Scalar>(OUT);
+        let mut slots = io.own::<L::Scalar>(slot!(Self::SLOTS, "out"));
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
                 let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
@@ -336,12 +347,13 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
-    const SHADER: Shader = shader::<M, PERIODIC>("elements/hex8", "energy");
+    const SHADER: Shader = shader::<Hex8, M, PERIODIC>("elements/hex8", "energy");
+    const SLOTS: &'static [Slot] = &energy_slots(false);
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { nodes, .. } = io.params();
-        let mut out = io.own::<L::Scalar>(OUT);
+        let mut out = io.own::<L::Scalar>(slot!(Self::SLOTS, "out"));
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
                 let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
@@ -363,7 +375,8 @@ impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
 }
 
 impl<M: Material, const PERIODIC: bool, const WEIGHED: bool> Kernel for Bound<M, PERIODIC, WEIGHED> {
-    const SHADER: Shader = weighed_shader::<M, PERIODIC, WEIGHED>("elements/hex8", "bound");
+    const SHADER: Shader = weighed_shader::<Hex8, M, PERIODIC, WEIGHED>("elements/hex8", "bound");
+    const SLOTS: &'static [Slot] = &bound_slots(WEIGHED);
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

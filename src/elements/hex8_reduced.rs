@@ -14,7 +14,10 @@
 //! and leaves W. The modes bend fibres within an element: there the fibres' own stiffness has no part.
 
 use super::LANES;
-use super::block::{BINARY, Lanes, OUT, Params, dot, shader, total, weighed_shader};
+use super::block::{
+    BINARY, Element, Lanes, Params, bound_slots, dot, energy_slots, force_slots, shader, total, weighed_shader,
+};
+use crate::kernel::interface::{Constant, Slot, constants, slot};
 use crate::kernel::lane::Lane;
 use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
@@ -40,8 +43,13 @@ pub const MODES: [[f64; 8]; 4] = [
 
 /// Energies of the modes of a block, mJ.
 pub const HOURGLASS: usize = LANES;
-/// They are written after energies by mode.
-const OUT_HOURGLASS: usize = OUT + 1;
+
+/// The element.
+pub struct Hex8Reduced;
+
+impl Element for Hex8Reduced {
+    const CONSTANTS: &'static [Constant] = &constants![uint: SHAPE, VOLUME, MOMENTS, STIFFNESS, HOURGLASS];
+}
 
 /// Nodal forces of hexahedra; with `PERIODIC`, also the sum of stress for the homogenised first Piola stress.
 pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
@@ -152,12 +160,13 @@ fn deformation<L: Lane, const PERIODIC: bool>(io: &Io<L::Scalar>, lanes: &Lanes<
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
-    const SHADER: Shader = shader::<M, PERIODIC>("elements/hex8_reduced", "force");
+    const SHADER: Shader = shader::<Hex8Reduced, M, PERIODIC>("elements/hex8_reduced", "force");
+    const SLOTS: &'static [Slot] = &force_slots(PERIODIC);
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { nodes, .. } = io.params();
-        let mut slots = io.own::<L::Scalar>(OUT);
+        let mut slots = io.own::<L::Scalar>(slot!(Self::SLOTS, "out"));
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
                 let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
@@ -205,13 +214,14 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
 }
 
 impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
-    const SHADER: Shader = shader::<M, PERIODIC>("elements/hex8_reduced", "energy");
+    const SHADER: Shader = shader::<Hex8Reduced, M, PERIODIC>("elements/hex8_reduced", "energy");
+    const SLOTS: &'static [Slot] = &energy_slots(true);
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { nodes, .. } = io.params();
-        let mut out = io.own::<L::Scalar>(OUT);
-        let mut hourglass = io.own::<L::Scalar>(OUT_HOURGLASS);
+        let mut out = io.own::<L::Scalar>(slot!(Self::SLOTS, "out"));
+        let mut hourglass = io.own::<L::Scalar>(slot!(Self::SLOTS, "out_hourglass"));
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
                 let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
@@ -240,7 +250,8 @@ fn add_rows<L: Lane>(rows: &mut [L; 8], k_total: L, sizes: &[L; 8]) {
 }
 
 impl<M: Material, const PERIODIC: bool, const WEIGHED: bool> Kernel for Bound<M, PERIODIC, WEIGHED> {
-    const SHADER: Shader = weighed_shader::<M, PERIODIC, WEIGHED>("elements/hex8_reduced", "bound");
+    const SHADER: Shader = weighed_shader::<Hex8Reduced, M, PERIODIC, WEIGHED>("elements/hex8_reduced", "bound");
+    const SLOTS: &'static [Slot] = &bound_slots(WEIGHED);
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

@@ -6,5 +6,9 @@ pub mod block;
 pub mod hex8;
 pub mod hex8_reduced;
 
+use crate::kernel::interface::{Constant, constants};
+
 /// Hexahedra in a block, and fibre lines in a group.
 pub const LANES: usize = 16;
+/// What twins know of them.
+pub const CONSTANTS: [Constant; 1] = constants![uint: LANES];

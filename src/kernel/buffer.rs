@@ -14,9 +14,16 @@ pub enum Kind {
     Uint,
 }
 
-/// Name of a buffer in a plan.
+/// Name of a buffer in a plan: its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Buffer(pub usize);
+pub struct Buffer(pub(crate) usize);
+
+impl Buffer {
+    /// Number of its description in the plan.
+    pub fn number(self) -> usize {
+        self.0
+    }
+}
 
 /// A buffer as the plan describes it.
 #[derive(Debug, Clone)]
@@ -112,5 +119,10 @@ impl Array {
 
     pub fn is_empty(&self) -> bool {
         self.len == 0
+    }
+
+    /// Bytes of a number.
+    pub fn size(&self) -> usize {
+        self.size
     }
 }

@@ -1,8 +1,10 @@
 //! The arithmetic that a device must get right to the last bit: whole quanta with remainders that take many small steps, and
 //! sums of integers in any order. Compilers that re-associate floating-point sums would lose the steps.
 
+use super::buffer::Kind::{Int, Scalar};
+use super::interface::{Slot, constants, slot};
 use super::lane::{Lane, Real};
-use super::position::{QUANTUM, carry, quanta};
+use super::position::{self, QUANTUM, carry, quanta};
 use super::shader::Shader;
 use super::stage::{Io, Kernel};
 use std::ops::Range;
@@ -10,12 +12,6 @@ use std::sync::atomic::Ordering;
 
 /// Steps that every item takes.
 pub const STEPS: usize = 2048;
-
-pub const INCREMENTS: usize = 0;
-const QUANTA: usize = 1;
-const REMAINDER: usize = 2;
-/// Sum of all quanta, wrapping.
-const SUM: usize = 3;
 
 /// The march of every item.
 pub struct Exact;
@@ -27,14 +23,22 @@ pub fn start(item: usize) -> (i32, f64) {
 }
 
 impl Kernel for Exact {
-    const SHADER: Shader = Shader::new("kernel/exact", "exact");
+    const SHADER: Shader =
+        Shader { constants: &[&position::CONSTANTS, &constants![uint: STEPS]], ..Shader::new("kernel/exact", "exact") };
+    const SLOTS: &'static [Slot] = &[
+        Slot::read("increments", Scalar),
+        Slot::row("quanta", Int, 1),
+        Slot::row("remainders", Scalar, 1),
+        // of all quanta, wrapping
+        Slot::atomic("sum", Int),
+    ];
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let increments = io.scalars(INCREMENTS);
-        let mut quanta = io.own::<i32>(QUANTA);
-        let mut remainders = io.own::<L::Scalar>(REMAINDER);
-        let sum = io.atomics(SUM);
+        let increments = io.scalars(slot!(Self::SLOTS, "increments"));
+        let mut quanta = io.own::<i32>(slot!(Self::SLOTS, "quanta"));
+        let mut remainders = io.own::<L::Scalar>(slot!(Self::SLOTS, "remainders"));
+        let sum = io.atomics(slot!(Self::SLOTS, "sum"));
         for item in items {
             let (mut q, mut r) = (*quanta.at(0, item), *remainders.at(0, item));
             for step in 0..STEPS {

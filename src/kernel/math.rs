@@ -1,10 +1,15 @@
 //! Elementary functions as polynomials: the same statements, hence the same bits, on every processor, and a WGSL twin,
 //! since WGSL has neither log1p nor promises on ln and exp.
 
-use super::lane::{Lane, Real};
+use super::interface::{Constant, constants};
+use super::lane::{Lane, Real, SQRT_HALF_F32};
+use std::f64::consts::LOG2_E;
 
 const LN2_HIGH: f64 = 0.693_145_751_953_125; // 15 bits: exact products with exponents
 const LN2_LOW: f64 = 1.428_606_820_309_417_2e-6;
+/// What the twin shares, with the bits of √½ and of 1 in f32.
+pub const CONSTANTS: [Constant; 5] =
+    constants![scalar: LN2_HIGH, LN2_LOW, LOG2_E; uint: SQRT_HALF = SQRT_HALF_F32, BIAS = 1f32.to_bits()];
 
 /// Natural logarithm of a positive normal number; relative error of a few ulp, also next to 1.
 #[inline(always)]
@@ -37,7 +42,7 @@ fn logarithm<L: Lane>(f: L, e: L) -> L {
 /// e^x for |x| below 80.
 #[inline(always)]
 pub fn exp<L: Lane>(x: L) -> L {
-    let n = (x * L::new(std::f64::consts::LOG2_E)).round();
+    let n = (x * L::new(LOG2_E)).round();
     let r = n.fma(L::new(-LN2_LOW), n.fma(L::new(-LN2_HIGH), x));
     let terms = L::Scalar::EXP_TERMS;
     let mut p = L::new(1.0 / factorial(terms));

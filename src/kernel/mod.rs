@@ -4,6 +4,7 @@
 
 pub mod buffer;
 pub mod exact;
+pub mod interface;
 pub mod lane;
 pub mod math;
 pub mod node;

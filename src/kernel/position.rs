@@ -5,12 +5,17 @@
 //! remainder of at most half a quantum's carry. Differences of near nodes are then exact integers before they become
 //! f32. The range is ±256 mm. In f64 runs the integer part of displacements stays zero.
 
+use super::interface::{Constant, constants};
 use super::lane::Real;
 
 /// Size of a quantum, mm: 2⁻²³.
 pub const QUANTUM: f64 = 1.0 / 8_388_608.0;
 /// Quanta in a mm.
 pub const QUANTA_PER_MM: f64 = 8_388_608.0;
+/// Largest displacement along an axis, mm; so far inside of the range of quanta that no node leaves it between two looks.
+pub const MOST_MM: f64 = 252.0;
+/// What twins know of positions.
+pub const CONSTANTS: [Constant; 3] = constants![scalar: QUANTUM, QUANTA_PER_MM, MOST_MM];
 
 /// Nearest whole number of quanta of a coordinate in mm.
 pub fn quanta(mm: f64) -> i32 {
@@ -26,9 +31,6 @@ pub fn carry<R: Real>(quanta: i32, remainder: R) -> (i32, R) {
     let whole = (remainder * R::from_f64(QUANTA_PER_MM)).to_i32();
     (quanta.wrapping_add(whole), remainder - R::from_i32(whole) * R::from_f64(QUANTUM))
 }
-
-/// Largest displacement along an axis, mm; so far inside of the range of quanta that no node leaves it between two looks.
-pub const MOST_MM: f64 = 252.0;
 
 /// A displacement, mm.
 #[inline(always)]

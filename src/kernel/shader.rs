@@ -2,22 +2,24 @@
 //!
 //! A twin has the path and the function names of its Rust file and repeats the same statements for one item. A kernel is a
 //! function of the number of an item (of a share of an item, if several invocations work on it), or of a share and the
-//! number of the invocation if a workgroup does. Its text starts with the constants of the stage and ends with the entry point,
-//! `kernel/stage`, which calls it; lines that begin with `#` direct the composition:
+//! number of the invocation if a workgroup does. Its text starts with the constants and the bindings that Rust declares for it (see
+//! [`super::interface`]; of the constants, those that it uses), and ends with the entry point, `kernel/stage`, which calls it; lines
+//! that begin with `#` direct the composition:
 //!
 //! - `#include "kernel/math"` puts a file there, the first time it is asked for; `#include LAW` the file of the law
 //!   of the stage,
 //! - `#if NAME`, `#else`, `#endif` keep lines only if the name is defined, so that an effect that a scene does not have leaves
-//!   no text and no binding. Defined are the names that the kernel gives, its own name, `ROOT` in the file of the
-//!   kernel itself (its bindings and kernels are not for the files that include it), and what `#define NAME` added.
+//!   no text. Defined are the names that the kernel gives, its own name, `ROOT` in the file of the kernel itself (its kernels are
+//!   not for the files that include it), and what `#define NAME` added.
 //!
 //! Every line of the text knows the file and the line it comes from. Group 0 holds the row of the step, group 1 the buffers of
-//! the stage at the numbers of the kernel's constants (reads, then writes), group 2 the range of items and the parameters of
-//! the stage.
+//! the stage at the numbers of the kernel's slots, group 2 the range of items and the parameters of the stage.
 
+use super::interface::Constant;
 use super::stage::Stage;
 use crate::error::{Error, Result};
 use include_dir::{Dir, include_dir};
+use std::collections::HashSet;
 use std::fmt::Write as _;
 
 static SHADERS: Dir = include_dir!("$CARGO_MANIFEST_DIR/shaders");
@@ -42,6 +44,8 @@ pub struct Shader {
     pub law: Option<&'static str>,
     /// Who works on one item.
     pub share: Share,
+    /// Constants that its files may use, module by module.
+    pub constants: &'static [&'static [Constant]],
 }
 
 /// How many work on one item of a stage.
@@ -66,7 +70,7 @@ impl Share {
 impl Shader {
     /// One invocation an item, nothing defined.
     pub const fn new(file: &'static str, kernel: &'static str) -> Self {
-        Self { file, kernel, defines: &[], law: None, share: Share::Invocations(1) }
+        Self { file, kernel, defines: &[], law: None, share: Share::Invocations(1), constants: &[] }
     }
 }
 
@@ -108,12 +112,35 @@ impl Text {
             included: Vec::new(),
             defined: [&[shader.kernel], of_workgroups, shader.defines].concat(),
         };
-        for (name, value) in [("WORKGROUP", WORKGROUP), ("SHARES", shares)].iter().chain(&stage.constants) {
-            composer.push(&format!("const {name}: u32 = {value}u;"), ("constants of the stage", 0));
-        }
         composer.include(shader.file)?;
         composer.include(STAGE)?;
-        Ok(composer.text)
+        let mut text = Self { text: String::new(), lines: Vec::new() };
+        let of_stage =
+            [("WORKGROUP", WORKGROUP), ("ITEM_SHARES", shares)].into_iter().chain(stage.constants.iter().copied());
+        let of_stage = of_stage.map(|(name, value)| Constant::uint(name, value));
+        let of_files = shader.constants.iter().copied().flatten().copied();
+        let words = composer.text.words();
+        for constant in of_stage.chain(of_files).filter(|constant| words.contains(constant.name)) {
+            text.push(&constant.declaration(), ("constants from Rust", 0));
+        }
+        for (number, slot) in stage.kernel.slots.iter().filter(|slot| slot.there).enumerate() {
+            text.push(&slot.declaration(number), ("slots of the kernel", 0));
+        }
+        text.text.push_str(&composer.text.text);
+        text.lines.extend(composer.text.lines);
+        Ok(text)
+    }
+
+    fn push(&mut self, line: &str, from: (&'static str, usize)) {
+        // writing to a String does not fail
+        let _ = writeln!(self.text, "{line}");
+        self.lines.push(from);
+    }
+
+    /// All words outside of comments.
+    pub fn words(&self) -> HashSet<&str> {
+        let code = self.text.lines().map(|line| line.split("//").next().unwrap_or_default());
+        code.flat_map(|code| code.split(|c: char| !c.is_ascii_alphanumeric() && c != '_')).collect()
     }
 
     /// The module, parsed and validated.
@@ -149,12 +176,6 @@ impl Text {
 }
 
 impl Composer {
-    fn push(&mut self, line: &str, from: (&'static str, usize)) {
-        // writing to a String does not fail
-        let _ = writeln!(self.text.text, "{line}");
-        self.text.lines.push(from);
-    }
-
     fn include(&mut self, path: &'static str) -> Result<()> {
         if self.included.contains(&path) {
             return Ok(());
@@ -170,9 +191,9 @@ impl Composer {
             let keep = kept.iter().all(|keep| *keep);
             let Some(directive) = line.trim_start().strip_prefix('#') else {
                 if keep && path == STAGE {
-                    self.push(&line.replace("KERNEL", self.shader.kernel), (path, number));
+                    self.text.push(&line.replace("KERNEL", self.shader.kernel), (path, number));
                 } else if keep {
-                    self.push(line, (path, number));
+                    self.text.push(line, (path, number));
                 }
                 continue;
             };
@@ -204,20 +225,21 @@ impl Composer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::buffer::Buffer;
     use crate::kernel::exact::Exact;
-    use crate::kernel::stage::{Code, Kernel};
+    use crate::kernel::stage::{Code, Kernel, wires};
 
     fn stage(shader: Shader) -> Stage {
-        let kernel = Code { shader, ..Code::of::<Exact>() };
-        let (reads, writes, params, constants) = Default::default();
-        Stage { name: "test", first: 0, count: 1, grain: 1, reads, writes, params, constants, kernel, waits: true }
+        let [increments, quanta, remainders, sum] = [0, 1, 2, 3].map(Buffer);
+        let wires = wires![increments, quanta, remainders, sum];
+        Stage::new("test", Code { shader, ..Code::of::<Exact>() }, (1, 1), &wires, [0u32; 0])
     }
 
     #[test]
     fn an_error_names_the_file_and_line_of_the_source() {
         let mut text = Text::of(&stage(Exact::SHADER)).unwrap();
         assert!(text.module().is_ok());
-        let (file, number) = ("kernel/position", 5);
+        let (file, number) = ("kernel/position", 4);
         let at = text.lines.iter().position(|l| *l == (file, number)).unwrap();
         let mut lines: Vec<&str> = text.text.lines().collect();
         for (wrong, why) in [("let x = ;", "expected"), ("fn wrong() -> f32 { return 1u; }", "return")] {
@@ -225,7 +247,7 @@ mod tests {
             let broken = Text { text: lines.join("\n"), lines: std::mem::take(&mut text.lines) };
             let message = broken.module().unwrap_err().to_string();
             println!("{message}");
-            assert!(message.starts_with("shaders/kernel/position.wgsl:5: "), "{message}");
+            assert!(message.starts_with("shaders/kernel/position.wgsl:4: "), "{message}");
             assert!(message.to_lowercase().contains(why), "{message}");
             text.lines = broken.lines;
         }

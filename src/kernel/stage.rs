@@ -1,6 +1,7 @@
 //! Stages and plans: the whole algorithm as data. A backend runs stages and knows no physics.
 
 use super::buffer::{Buffer, Description};
+use super::interface::{Access, Slot};
 use super::lane::{Isa, Lane, Real, Work};
 use super::row::Row;
 use super::shader::Shader;
@@ -9,39 +10,152 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
-/// How the items of a stage write to a buffer. Reads of the same buffer by the same item are allowed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Access {
-    /// Item `i` owns `stride` numbers from `i · stride` in each of `planes` equal parts of the buffer.
-    Own { planes: usize, stride: usize },
-    /// Items own disjoint numbers that a table or the constants of the stage name.
-    Scatter,
-    /// Integers that any item may add to; the order does not matter.
-    Atomic,
+/// A buffer to bind to a slot, if there is one, and how many numbers an item owns in it where only the plan knows.
+#[derive(Debug, Clone, Copy)]
+pub struct Wire {
+    buffer: Option<Buffer>,
+    stride: Option<usize>,
 }
 
-/// One parallel loop over items.
+impl From<Buffer> for Wire {
+    fn from(buffer: Buffer) -> Self {
+        Self { buffer: Some(buffer), stride: None }
+    }
+}
+
+impl From<Option<Buffer>> for Wire {
+    fn from(buffer: Option<Buffer>) -> Self {
+        Self { buffer, stride: None }
+    }
+}
+
+impl From<(Buffer, usize)> for Wire {
+    fn from((buffer, stride): (Buffer, usize)) -> Self {
+        Self { buffer: Some(buffer), stride: Some(stride) }
+    }
+}
+
+/// Buffers by the names of slots: `wires![mass, velocity, forces: beam_force]`; a buffer may be an option, or have a stride.
+macro_rules! wires {
+    ($($name:ident $(: $buffer:expr)?),* $(,)?) => {
+        [$((stringify!($name), crate::kernel::stage::wires!(@ $name $($buffer)?))),*]
+    };
+    (@ $name:ident) => { crate::kernel::stage::Wire::from($name) };
+    (@ $name:ident $buffer:expr) => { crate::kernel::stage::Wire::from($buffer) };
+}
+pub(crate) use wires;
+
+/// One parallel loop over items. Only the crate makes stages: a kernel trusts that its slots are bound as it declares them.
 #[derive(Clone)]
 pub struct Stage {
-    /// Name in messages, timings and `check --explain`.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// First item.
-    pub first: usize,
+    pub(crate) first: usize,
     /// Number of items.
-    pub count: usize,
+    pub(crate) count: usize,
     /// Items in one chunk of work; fixed, so that results do not depend on the number of threads.
-    pub grain: usize,
-    /// Buffers in the order of the kernel's constants.
-    pub reads: Vec<Buffer>,
-    /// Buffers written, numbered after the reads.
-    pub writes: Vec<(Buffer, Access)>,
+    pub(crate) grain: usize,
+    /// Buffers of the slots that are there: those that are read.
+    pub(crate) reads: Vec<Buffer>,
+    /// Those that are written, numbered after the reads.
+    pub(crate) writes: Vec<(Buffer, Access)>,
     /// Small constants of the stage, laid out as the kernel's `Params`.
-    pub params: Vec<u8>,
-    /// Constants in the text of the shader.
-    pub constants: Vec<(&'static str, usize)>,
-    pub kernel: Code,
+    pub(crate) params: Vec<u8>,
+    /// Constants of the scene in the text of the shader.
+    pub(crate) constants: Vec<(&'static str, usize)>,
+    pub(crate) kernel: Code,
     /// Whether it must wait for the stages before it; else it may run beside them.
-    pub waits: bool,
+    pub(crate) waits: bool,
+}
+
+impl Stage {
+    /// A stage over `count` items in chunks of `grain` that waits for those before it. A slot that is not there needs no buffer.
+    ///
+    /// # Panics
+    /// On a slot without its buffer, a buffer without a slot, a stride that does not fit, and a buffer that is written through one
+    /// slot and bound to another.
+    pub(crate) fn new(
+        name: &'static str,
+        kernel: Code,
+        (count, grain): (usize, usize),
+        wires: &[(&'static str, Wire)],
+        params: impl Pod,
+    ) -> Self {
+        let unknown = wires.iter().find(|(wire, _)| kernel.slots.iter().all(|slot| slot.name != *wire));
+        assert!(unknown.is_none(), "stage `{name}`: its kernel has no slot for {unknown:?}");
+        let (mut reads, mut writes) = (Vec::new(), Vec::new());
+        for slot in kernel.slots.iter().filter(|slot| slot.there) {
+            let wrong = |what: &str| -> ! { panic!("stage `{name}`, slot `{}`: {what}", slot.name) };
+            let wire = wires.iter().find(|(wire, _)| *wire == slot.name).map(|(_, wire)| *wire);
+            let Some(Wire { buffer: Some(buffer), stride }) = wire else { wrong("no buffer is bound to it") };
+            match slot.access_with(stride).unwrap_or_else(|what| wrong(what)) {
+                None if writes.is_empty() => reads.push(buffer),
+                None => wrong("is read and declared behind one that is written"),
+                Some(access) => writes.push((buffer, access)),
+            }
+        }
+        for (i, (written, _)) in writes.iter().enumerate() {
+            let twice = reads.contains(written) || writes[..i].iter().any(|(other, _)| other == written);
+            assert!(!twice, "stage `{name}`: a buffer that it writes is bound twice");
+        }
+        let params = bytemuck::bytes_of(&params).to_vec();
+        Self { name, first: 0, count, grain, reads, writes, params, constants: Vec::new(), kernel, waits: true }
+    }
+
+    /// A stage of a kernel outside of the crate, over some items and buffers by the names of its slots.
+    ///
+    /// # Safety
+    /// No two items of the kernel write to the same number of a buffer that it binds with [`Access::Scatter`].
+    pub unsafe fn foreign<K: Kernel>(
+        name: &'static str,
+        items: Range<usize>,
+        buffers: &[(&'static str, Buffer)],
+    ) -> Self {
+        let wires: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, Wire::from(*buffer))).collect();
+        let stage = Self::new(name, Code::of::<K>(), (items.len(), items.len()), &wires, [0u32; 0]);
+        Self { first: items.start, ..stage }
+    }
+
+    /// The stage, free to run beside those before it.
+    pub(crate) fn beside(self) -> Self {
+        Self { waits: false, ..self }
+    }
+
+    /// The first `count` items of the stage as one chunk.
+    pub fn beginning(&self, count: usize) -> Self {
+        assert!(count <= self.count, "stage `{}` has {} items", self.name, self.count);
+        Self { count, grain: count, ..self.clone() }
+    }
+
+    /// Name in messages, timings and `check --explain`.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// The items.
+    pub fn items(&self) -> Range<usize> {
+        self.first..self.first + self.count
+    }
+
+    /// Buffers that are read, in the order of the slots of the kernel.
+    pub fn reads(&self) -> &[Buffer] {
+        &self.reads
+    }
+
+    /// Buffers that are written, in the order of the slots of the kernel.
+    pub fn writes(&self) -> &[(Buffer, Access)] {
+        &self.writes
+    }
+
+    /// The parameters of the stage.
+    pub fn params(&self) -> &[u8] {
+        &self.params
+    }
+
+    /// The kernel.
+    pub fn kernel(&self) -> &Code {
+        &self.kernel
+    }
 }
 
 /// Everything a backend needs to run a scene.
@@ -60,10 +174,29 @@ pub struct Plan {
     pub collect: Vec<Stage>,
 }
 
+impl Plan {
+    /// All buffers.
+    pub fn all(&self) -> impl Iterator<Item = Buffer> + use<> {
+        (0..self.buffers.len()).map(Buffer)
+    }
+
+    /// The buffer of a name, if there is one.
+    pub fn named(&self, name: &str) -> Option<Buffer> {
+        self.buffers.iter().position(|buffer| buffer.name == name).map(Buffer)
+    }
+
+    /// What a buffer is.
+    pub fn describe(&self, buffer: Buffer) -> &Description {
+        &self.buffers[buffer.0]
+    }
+}
+
 /// A kernel, written once for every precision and register width.
 pub trait Kernel: 'static {
     /// Its WGSL twin.
     const SHADER: Shader;
+    /// The buffers that it binds.
+    const SLOTS: &'static [Slot];
     /// Whether it works on registers, and gains from the widest; one that works number by number is compiled for fewer.
     const WIDE: bool = true;
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>);
@@ -84,17 +217,18 @@ macro_rules! flagged {
 }
 pub(crate) use flagged;
 
-/// A kernel as function pointers for the CPU, and where its WGSL twin is.
+/// A kernel as function pointers for the CPU, where its WGSL twin is, and what both bind.
 #[derive(Clone, Copy)]
 pub struct Code {
     pub f32: fn(&Io<f32>, Range<usize>),
     pub f64: fn(&Io<f64>, Range<usize>),
     pub shader: Shader,
+    pub slots: &'static [Slot],
 }
 
 impl Code {
     pub fn of<K: Kernel>() -> Self {
-        Self { f32: run::<K, f32>, f64: run::<K, f64>, shader: K::SHADER }
+        Self { f32: run::<K, f32>, f64: run::<K, f64>, shader: K::SHADER, slots: K::SLOTS }
     }
 }
 
@@ -114,8 +248,9 @@ fn run<K: Kernel, R: Real>(io: &Io<R>, items: Range<usize>) {
 #[derive(Clone, Copy)]
 pub struct Binding {
     pub address: *mut u8,
-    /// Numbers.
+    /// Numbers, and bytes of one.
     pub len: usize,
+    pub size: usize,
     pub access: Option<Access>,
 }
 
@@ -133,8 +268,15 @@ pub struct Io<'a, R: Real> {
 unsafe impl<R: Real> Sync for Io<'_, R> {}
 
 impl<R: Real> Io<'_, R> {
-    fn read<T>(&self, index: usize) -> &[T] {
+    /// A buffer, whose numbers have the size that the kernel takes them to have.
+    fn binding<T>(&self, index: usize) -> Binding {
         let b = self.bindings[index];
+        assert_eq!(b.size, size_of::<T>(), "buffer {index} holds other numbers");
+        b
+    }
+
+    fn read<T>(&self, index: usize) -> &[T] {
+        let b = self.binding::<T>(index);
         assert!(b.access.is_none(), "buffer {index} is bound for writing");
         // SAFETY: the backend binds live arrays, and no stage writes to a buffer that it reads.
         unsafe { std::slice::from_raw_parts(b.address.cast(), b.len) }
@@ -158,7 +300,7 @@ impl<R: Real> Io<'_, R> {
 
     /// The numbers that the items of this chunk own in a buffer.
     pub fn own<T: Pod>(&self, index: usize) -> Own<'_, T> {
-        let b = self.bindings[index];
+        let b = self.binding::<T>(index);
         let Some(Access::Own { planes, stride }) = b.access else { panic!("buffer {index} is not bound as Own") };
         Own {
             address: b.address.cast(),
@@ -172,14 +314,14 @@ impl<R: Real> Io<'_, R> {
 
     /// A buffer in which items write to disjoint places named by a table.
     pub fn scatter<T: Pod>(&self, index: usize) -> Scatter<'_, T> {
-        let b = self.bindings[index];
+        let b = self.binding::<T>(index);
         assert_eq!(b.access, Some(Access::Scatter), "buffer {index} is not bound as Scatter");
         Scatter { address: b.address.cast(), len: b.len, life: PhantomData }
     }
 
     /// Signed integers that every item may add to.
     pub fn atomics(&self, index: usize) -> &[AtomicI32] {
-        let b = self.bindings[index];
+        let b = self.binding::<AtomicI32>(index);
         assert_eq!(b.access, Some(Access::Atomic), "buffer {index} is not bound as Atomic");
         // SAFETY: atomics may be shared.
         unsafe { std::slice::from_raw_parts(b.address.cast(), b.len) }
@@ -187,7 +329,7 @@ impl<R: Real> Io<'_, R> {
 
     /// Unsigned integers that every item may add to.
     pub fn atomic_uints(&self, index: usize) -> &[AtomicU32] {
-        let b = self.bindings[index];
+        let b = self.binding::<AtomicU32>(index);
         assert_eq!(b.access, Some(Access::Atomic), "buffer {index} is not bound as Atomic");
         // SAFETY: atomics may be shared.
         unsafe { std::slice::from_raw_parts(b.address.cast(), b.len) }
@@ -272,5 +414,28 @@ pub fn raise<R: Real>(place: &AtomicU32, value: R) {
     let bits = (value.to_f64() as f32).to_bits();
     if bits > place.load(Ordering::Relaxed) {
         place.fetch_max(bits, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::exact::Exact;
+
+    /// Why a stage of [`Exact`] cannot bind these buffers.
+    fn refused(wires: &[(&'static str, Wire)]) -> String {
+        let bind = || Stage::new("march", Code::of::<Exact>(), (1, 1), wires, [0u32; 0]);
+        let reason = std::panic::catch_unwind(std::panic::AssertUnwindSafe(bind)).err().expect("it is refused");
+        *reason.downcast::<String>().expect("with a message")
+    }
+
+    #[test]
+    fn what_does_not_fit_a_slot_is_refused_by_name() {
+        let [increments, quanta, remainders, sum] = [0, 1, 2, 3].map(Buffer);
+        let missing = refused(&wires![increments, quanta, sum]);
+        assert_eq!(missing, "stage `march`, slot `remainders`: no buffer is bound to it");
+        assert!(refused(&wires![increments, quanta, remainders, sum, total: sum]).contains("total"));
+        assert!(refused(&wires![increments, quanta: (quanta, 2), remainders, sum]).contains("takes no stride"));
+        assert!(refused(&wires![increments, quanta, remainders: increments, sum]).contains("bound twice"));
     }
 }

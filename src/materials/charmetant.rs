@@ -14,6 +14,7 @@
 //! cap the power is continued by the parabola with the same slope.
 
 use super::{Material, Moduli, PARAMETERS, Tensor, add_product, jacobian};
+use crate::kernel::interface::{Constant, constants};
 use crate::kernel::lane::Lane;
 use crate::kernel::math::{asinh_ratio, exp, ln, log1p};
 
@@ -102,6 +103,10 @@ fn compaction_power<L: Lane>(p: &[L; PARAMETERS], i_comp: L) -> (L, L) {
 
 impl Material for Charmetant {
     const SHADER: &'static str = "materials/charmetant";
+    const CONSTANTS: &'static [Constant] = &constants![
+        uint: K_ELONG, K_COMP, P_COMP, K_DIST, K_SH, CAP, CAP_SLOPE, CAP_ENERGY;
+        scalar: TINY, CRUSHED
+    ];
 
     #[inline(always)]
     fn stress<L: Lane>(p: &[L; PARAMETERS], h: &Tensor<L>) -> Tensor<L> {

@@ -3,6 +3,7 @@
 pub mod charmetant;
 pub mod neo_hookean;
 
+use crate::kernel::interface::{Constant, constants};
 use crate::kernel::lane::Lane;
 use crate::settings::material::Material as Choice;
 
@@ -11,12 +12,16 @@ pub type Tensor<L> = [[L; 3]; 3];
 
 /// Numbers that a law may keep in its row of the material table.
 pub const PARAMETERS: usize = 8;
+/// What twins know of all laws.
+pub const CONSTANTS: [Constant; 1] = constants![uint: PARAMETERS];
 
 /// A hyperelastic law in the frame of the fibre (axis 1), from the displacement gradient H = F − I: forming strains from
 /// H loses nothing to cancellation at small strain.
 pub trait Material: 'static {
     /// Its WGSL twin under `shaders/`.
     const SHADER: &'static str;
+    /// What that takes from Rust.
+    const CONSTANTS: &'static [Constant];
 
     /// First Piola–Kirchhoff stress, MPa.
     fn stress<L: Lane>(parameters: &[L; PARAMETERS], h: &Tensor<L>) -> Tensor<L>;

@@ -7,6 +7,7 @@
 //! - S = (μ cof C t + λ ln J cof C)/J², symmetric to the last bit.
 
 use super::{Material, Moduli, PARAMETERS, Tensor, add_product, jacobian};
+use crate::kernel::interface::{Constant, constants};
 use crate::kernel::lane::Lane;
 use crate::kernel::math::{ln, log1p};
 
@@ -75,6 +76,7 @@ fn strain<L: Lane>(h: &Tensor<L>) -> Strain<L> {
 
 impl Material for NeoHookean {
     const SHADER: &'static str = "materials/neo_hookean";
+    const CONSTANTS: &'static [Constant] = &constants![uint: MU, LAMBDA, TERMS; scalar: CRUSHED, SMALL];
 
     #[inline(always)]
     fn stress<L: Lane>(p: &[L; PARAMETERS], h: &Tensor<L>) -> Tensor<L> {

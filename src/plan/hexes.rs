@@ -1,18 +1,20 @@
 //! The buffers and stages of hexahedra, of the element and of the laws that the scene has.
 
-use super::solids::Solids;
-use super::{Builder, beside, own, waiting};
+use super::Tables;
+use super::builder::Builder;
+use super::nodes::Nodes;
+use crate::dynamics::time_step;
 use crate::elements::block::{BOUND, ENERGY, Params, SLOTS, VIRIAL};
 use crate::elements::{hex8, hex8_reduced};
 use crate::kernel::buffer::Buffer;
-use crate::kernel::stage::{Access, Kernel, Stage};
+use crate::kernel::stage::{Code, Kernel, Stage, Wire, wires};
 use crate::materials::charmetant::Charmetant;
 use crate::materials::neo_hookean::NeoHookean;
 use crate::materials::{Law, Material};
 use std::ops::Range;
 
-/// What hexahedra write.
-pub(super) struct HexBuffers {
+/// Buffers of hexahedra. Those that may be missing are there in a scene with solids, and with what writes them.
+pub(super) struct Hexes {
     pub force: Buffer,
     pub bound: Buffer,
     pub energy: Option<Buffer>,
@@ -20,98 +22,90 @@ pub(super) struct HexBuffers {
     pub hourglass: Option<Buffer>,
     /// Stress sums of periodic scenes.
     pub virial: Option<Buffer>,
+    /// Row sums of the stiffness of elements at nodes, and R/m: what bounds are weighed with.
+    pub limit: Buffer,
     /// Bounds again, weighed.
     pub weighed_bounds: Vec<Stage>,
 }
 
-/// Blocks of one law, and what their stages read.
-struct Blocks<'a> {
-    range: Range<usize>,
-    reads: &'a [Buffer],
-    limits: Buffer,
+/// What the stages of all laws bind and know.
+struct Common {
+    wires: Vec<(&'static str, Wire)>,
     params: Params,
 }
 
-impl HexBuffers {
-    /// Adds tables, results and stages, but for those of weighed bounds; `position` are quanta and remainder of
-    /// displacements, `limits` the row sums and R/m of nodes.
-    pub(super) fn add(
-        b: &mut Builder,
-        solids: &Solids,
-        position: [Buffer; 2],
-        limits: Buffer,
-        periodic: bool,
-        reduced: bool,
-        params: Params,
-    ) -> Self {
-        let hexes = solids.headers.len();
-        let materials = b.table("materials", solids.materials.clone());
-        let frames = b.table("fibre frames", solids.frames.clone());
-        let shapes = b.table("shapes", solids.shapes.clone());
-        let headers = b.indices("hex blocks", bytemuck::cast_slice(&solids.headers).to_vec());
-        let corners = b.indices("hex corners", solids.corners.clone());
-        let mut buffers = Self {
+impl Hexes {
+    /// Adds tables, results and stages, but for those of weighed bounds.
+    pub fn add(b: &mut Builder, t: &Tables, nodes: &Nodes) -> Self {
+        let limit = b.scratch("element stiffness of nodes", 2 * nodes.count);
+        let hexes = t.solids.headers.len();
+        let materials = b.table("materials", t.solids.materials.clone());
+        let frames = b.table("fibre frames", t.solids.frames.clone());
+        let shapes = b.table("shapes", t.solids.shapes.clone());
+        let headers = b.indices("hex blocks", bytemuck::cast_slice(&t.solids.headers).to_vec());
+        let corners = b.indices("hex corners", t.solids.corners.clone());
+        let reduced = t.scene.integration.hourglass_control().is_some();
+        let mut all = Self {
             force: b.scratch("hex corner forces", SLOTS * hexes),
             bound: b.scratch("hex stiffness bounds", BOUND * hexes),
             energy: (hexes > 0).then(|| b.scratch("hex energies", ENERGY * hexes)),
             hourglass: (hexes > 0 && reduced).then(|| b.scratch("hourglass energies", hex8_reduced::HOURGLASS * hexes)),
-            virial: (hexes > 0 && periodic).then(|| b.scratch("hex stress sums", VIRIAL * hexes)),
+            virial: (hexes > 0 && t.active.periodic).then(|| b.scratch("hex stress sums", VIRIAL * hexes)),
+            limit,
             weighed_bounds: Vec::new(),
         };
-        let [quanta, remainder] = position;
-        let reads = &[headers, corners, quanta, remainder, shapes, frames, materials];
-        for (law, range) in &solids.laws {
-            let blocks = Blocks { range: range.clone(), reads, limits, params };
-            match law {
-                Law::Charmetant => buffers.law::<Charmetant>(b, &blocks),
-                Law::NeoHookean => buffers.law::<NeoHookean>(b, &blocks),
-            }
-        }
-        buffers
-    }
-
-    fn law<M: Material>(&mut self, b: &mut Builder, blocks: &Blocks) {
-        match self.virial {
-            Some(_) => self.stages::<M, true>(b, blocks),
-            None => self.stages::<M, false>(b, blocks),
-        }
-    }
-
-    fn stages<M: Material, const PERIODIC: bool>(&mut self, b: &mut Builder, blocks: &Blocks) {
-        let force = (self.force, own(1, SLOTS));
-        let forces: Vec<_> = [force].into_iter().chain(self.virial.map(|v| (v, own(1, VIRIAL)))).collect();
-        let energies: Vec<_> = self.energy.map(|e| (e, own(1, ENERGY))).into_iter().collect();
-        let bounds = [(self.bound, own(1, BOUND))];
-        let reads = [blocks.reads, &[blocks.limits]].concat();
-        let weighed = Blocks { range: blocks.range.clone(), reads: &reads, ..*blocks };
-        let [step, energy, bound, weighed] = match self.hourglass {
-            Some(hourglass) => {
-                let energies = [&energies[..], &[(hourglass, own(1, hex8_reduced::HOURGLASS))]].concat();
-                [
-                    blocks.stage::<hex8_reduced::Force<M, PERIODIC>>("hex8 reduced", &forces),
-                    blocks.stage::<hex8_reduced::Energy<M, PERIODIC>>("hex8 reduced energy", &energies),
-                    blocks.stage::<hex8_reduced::Bound<M, PERIODIC, false>>("hex8 reduced bound", &bounds),
-                    weighed.stage::<hex8_reduced::Bound<M, PERIODIC, true>>("hex8 reduced weighed bound", &bounds),
-                ]
-            }
-            None => [
-                blocks.stage::<hex8::Force<M, PERIODIC>>("hex8", &forces),
-                blocks.stage::<hex8::Energy<M, PERIODIC>>("hex8 energy", &energies),
-                blocks.stage::<hex8::Bound<M, PERIODIC, false>>("hex8 bound", &bounds),
-                weighed.stage::<hex8::Bound<M, PERIODIC, true>>("hex8 weighed bound", &bounds),
-            ],
+        let left = match t.fibre_lines() {
+            Some(lines) => time_step::left(lines.beta) as f32,
+            None => 0.0,
         };
-        b.plan.step.push(step);
-        b.plan.diagnose.extend([energy, bound]);
-        self.weighed_bounds.push(waiting(weighed));
+        let &Nodes { quanta, remainder, .. } = nodes;
+        let common = Common {
+            wires: wires![headers, corners, quanta, remainder, shapes, frames, materials].to_vec(),
+            params: Params { nodes: nodes.count as u32, left },
+        };
+        for (law, blocks) in &t.solids.laws {
+            match (law, t.active.periodic) {
+                (Law::Charmetant, true) => all.stages::<Charmetant, true>(b, &common, blocks),
+                (Law::Charmetant, false) => all.stages::<Charmetant, false>(b, &common, blocks),
+                (Law::NeoHookean, true) => all.stages::<NeoHookean, true>(b, &common, blocks),
+                (Law::NeoHookean, false) => all.stages::<NeoHookean, false>(b, &common, blocks),
+            }
+        }
+        all
+    }
+
+    /// Adds the stages of the blocks of a law.
+    fn stages<M: Material, const PERIODIC: bool>(&mut self, b: &mut Builder, common: &Common, blocks: &Range<usize>) {
+        let forces = wires![out: self.force, out_virial: self.virial];
+        let energies = wires![out: self.energy, out_hourglass: self.hourglass];
+        let bounds = wires![weights: self.limit, out: self.bound];
+        let [step, energy, bound, weighed] = if self.hourglass.is_some() {
+            [
+                common.stage::<hex8_reduced::Force<M, PERIODIC>>("hex8 reduced", blocks, &forces),
+                common.stage::<hex8_reduced::Energy<M, PERIODIC>>("hex8 reduced energy", blocks, &energies),
+                common.stage::<hex8_reduced::Bound<M, PERIODIC, false>>("hex8 reduced bound", blocks, &bounds),
+                common.stage::<hex8_reduced::Bound<M, PERIODIC, true>>("hex8 reduced weighed bound", blocks, &bounds),
+            ]
+        } else {
+            [
+                common.stage::<hex8::Force<M, PERIODIC>>("hex8", blocks, &forces),
+                common.stage::<hex8::Energy<M, PERIODIC>>("hex8 energy", blocks, &energies),
+                common.stage::<hex8::Bound<M, PERIODIC, false>>("hex8 bound", blocks, &bounds),
+                common.stage::<hex8::Bound<M, PERIODIC, true>>("hex8 weighed bound", blocks, &bounds),
+            ]
+        };
+        b.plan.step.push(step.beside());
+        b.plan.diagnose.extend([energy.beside(), bound.beside()]);
+        self.weighed_bounds.push(weighed);
     }
 }
 
-impl Blocks<'_> {
-    fn stage<K: Kernel>(&self, name: &'static str, writes: &[(Buffer, Access)]) -> Stage {
+impl Common {
+    fn stage<K: Kernel>(&self, name: &'static str, blocks: &Range<usize>, wires: &[(&'static str, Wire)]) -> Stage {
         /// Blocks in a chunk.
         const GRAIN: usize = 4;
-        let stage = beside::<K>(name, self.range.len(), GRAIN, self.reads, writes, self.params);
-        Stage { first: self.range.start, ..stage }
+        let wires = [&self.wires[..], wires].concat();
+        let stage = Stage::new(name, Code::of::<K>(), (blocks.len(), GRAIN), &wires, self.params);
+        Stage { first: blocks.start, ..stage }
     }
 }

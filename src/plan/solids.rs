@@ -185,6 +185,17 @@ impl Solids {
     }
 }
 
+/// Largest top-to-bottom distance of a block's first section, mm.
+pub(super) fn thickness(mesh: &Mesh, block: &Block) -> f64 {
+    (0..=block.columns)
+        .map(|c| {
+            let (low, high) = (mesh.nodes[block.line(c, 0)], mesh.nodes[block.line(c, block.layers)]);
+            let d = [0, 1, 2].map(|k| high[k] - low[k]);
+            libm::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+        })
+        .fold(0.0, f64::max)
+}
+
 /// Puts a slot into the first free place of a node.
 fn put(table: &mut [u32], node: usize, slot: usize) {
     let places = &mut table[SOLID * node..][..SOLID];

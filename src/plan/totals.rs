@@ -1,6 +1,9 @@
 //! The stages that add up what kernels keep per item, and where the host finds the sums.
 
-use super::{Active, Builder, beside, coded};
+use super::beams::Beams;
+use super::builder::Builder;
+use super::nodes::Nodes;
+use super::{Active, Parts};
 use crate::contact::{slip, sums};
 use crate::dynamics::energy;
 use crate::dynamics::integrate::Works;
@@ -10,8 +13,7 @@ use crate::elements::block::{ENERGY, VIRIAL};
 use crate::elements::hex8_reduced::HOURGLASS;
 use crate::kernel::buffer::Buffer;
 use crate::kernel::position::quanta;
-use crate::kernel::stage::{Access, Code, Stage, flagged};
-use crate::mesh::Mesh;
+use crate::kernel::stage::{Code, Stage, flagged, wires};
 use std::ops::Range;
 
 /// Where sums of columns are in the totals, part by part.
@@ -79,41 +81,6 @@ pub struct Totals {
     pub stiffness: Largest,
 }
 
-/// Buffers that are added up.
-pub(super) struct Sources<'a> {
-    pub mesh: &'a Mesh,
-    /// Mass that acts, tonne.
-    pub masses: &'a [f64],
-    /// Block and lane of each hexahedron.
-    pub hex_place: &'a [(usize, usize)],
-    pub hex_blocks: usize,
-    pub bends: usize,
-    /// Contact points of threads and of yarns.
-    pub points: [usize; 2],
-    pub active: Active,
-    pub conditions: usize,
-    pub mass: Buffer,
-    pub velocity: Buffer,
-    pub reference: Buffer,
-    pub work: Option<Buffer>,
-    pub weighed_limit: Buffer,
-    pub beam_table: Buffer,
-    pub hex_energy: Option<Buffer>,
-    pub hex_hourglass: Option<Buffer>,
-    pub hex_virial: Option<Buffer>,
-    pub beam_tension: Option<Buffer>,
-    pub beam_work: Option<Buffer>,
-    pub beam_virial: Option<Buffer>,
-    pub bend_energy: Option<Buffer>,
-    pub bend_virial: Option<Buffer>,
-    pub face_sums: [Option<Buffer>; 2],
-    pub pair_sums: Option<Buffer>,
-    /// Energies of ties, and their number.
-    pub ties: Option<(Buffer, usize)>,
-    pub reaction_work: Option<Buffer>,
-    pub added_mass: Option<Buffer>,
-}
-
 /// Items of a chunk: about as many numbers as a chunk of nodes has.
 const GRAIN: usize = 4;
 
@@ -177,8 +144,9 @@ impl Collector<'_> {
     fn taken(&mut self, buffer: Buffer, columns: Columns, waits: bool) -> Sums {
         let (sums, length) = self.room(columns.count, columns.columns);
         let params = self.params(&columns, sums, length);
-        let writes = [(buffer, Access::Scatter), (self.totals, Access::Scatter)];
-        let stage = beside::<Sum<true>>("totals taken", sums.parts * sums.columns, GRAIN, &[], &writes, params);
+        let wires = wires![source: buffer, totals: self.totals];
+        let work = (sums.parts * sums.columns, GRAIN);
+        let stage = Stage::new("totals taken", Code::of::<Sum<true>>(), work, &wires, params);
         self.b.plan.collect.push(Stage { waits, ..stage });
         sums
     }
@@ -187,9 +155,9 @@ impl Collector<'_> {
     fn kept(&mut self, buffer: Buffer, columns: Columns) -> Sums {
         let (sums, length) = self.room(columns.count, columns.columns);
         let params = self.params(&columns, sums, length);
-        let writes = [(self.totals, Access::Scatter)];
-        let stage = beside::<Sum<false>>("totals", sums.parts * sums.columns, GRAIN, &[buffer], &writes, params);
-        self.b.plan.collect.push(stage);
+        let wires = wires![source: buffer, totals: self.totals];
+        let work = (sums.parts * sums.columns, GRAIN);
+        self.b.plan.collect.push(Stage::new("totals", Code::of::<Sum<false>>(), work, &wires, params).beside());
         sums
     }
 
@@ -197,109 +165,115 @@ impl Collector<'_> {
     fn largest(&mut self, buffer: Buffer, columns: Columns, lanes_used: Option<Buffer>) -> Largest {
         let (sums, length) = self.room(columns.count, WORST);
         let params = self.params(&columns, sums, length);
-        let writes = [(self.totals, Access::Scatter)];
-        self.b.plan.collect.push(match lanes_used {
-            Some(used) => beside::<Worst<true>>("worst", sums.parts, GRAIN, &[buffer, used], &writes, params),
-            None => beside::<Worst<false>>("worst", sums.parts, GRAIN, &[buffer], &writes, params),
-        });
+        let wires = wires![source: buffer, lanes_used, totals: self.totals];
+        let kernel = flagged!(Worst; lanes_used.is_some());
+        self.b.plan.collect.push(Stage::new("worst", kernel, (sums.parts, GRAIN), &wires, params).beside());
         Largest { into: sums.into, parts: sums.parts, length }
     }
 
     /// ½ Σ m v² of nodes; `total` with the affine motion.
-    fn kinetic(&mut self, s: &Sources, total: bool) -> Sums {
-        let mass: f64 = s.masses.iter().sum();
+    fn kinetic(&mut self, p: &Parts, total: bool) -> Sums {
+        let masses = &p.nodes.masses;
+        let whole: f64 = masses.iter().sum();
         let centre = [0, 1, 2].map(|k| {
-            let moment: f64 = s.mesh.nodes.iter().zip(s.masses).map(|(x, m)| m * x[k]).sum();
-            quanta(moment / mass)
+            let moment: f64 = p.tables.mesh.nodes.iter().zip(masses).map(|(x, m)| m * x[k]).sum();
+            quanta(moment / whole)
         });
-        let (sums, length) = self.room(s.masses.len(), 1);
+        let (sums, length) = self.room(masses.len(), 1);
         let params = energy::Params {
-            count: s.masses.len() as u32,
+            count: masses.len() as u32,
             length: length as u32,
             into: sums.into as u32,
             centre: if total { centre } else { [0; 3] },
         };
-        let (reads, writes) = ([s.velocity, s.mass, s.reference], [(self.totals, Access::Scatter)]);
-        self.b.plan.collect.push(if total {
-            beside::<energy::Kinetic<true>>("total kinetic energy", sums.parts, GRAIN, &reads, &writes, params)
-        } else {
-            beside::<energy::Kinetic<false>>("kinetic energy", sums.parts, GRAIN, &reads[..2], &writes, params)
-        });
+        let &Nodes { velocity, mass, reference, .. } = &p.nodes;
+        let wires = wires![velocity, mass, reference, totals: self.totals];
+        let name = if total { "total kinetic energy" } else { "kinetic energy" };
+        let kernel = flagged!(energy::Kinetic; total);
+        self.b.plan.collect.push(Stage::new(name, kernel, (sums.parts, GRAIN), &wires, params).beside());
         sums
     }
 
     /// ½ Σ N² L₀/EA of beams.
-    fn axial(&mut self, tension: Buffer, s: &Sources) -> Sums {
-        let count = s.mesh.beams();
+    fn axial(&mut self, tension: Buffer, beams: &Beams) -> Sums {
+        let count = beams.count;
         let (sums, length) = self.room(count, 1);
         let params =
             energy::Params { count: count as u32, length: length as u32, into: sums.into as u32, centre: [0; 3] };
-        let (reads, writes) = ([tension, s.beam_table], [(self.totals, Access::Scatter)]);
-        self.b.plan.collect.push(beside::<energy::Axial>("axial energy", sums.parts, GRAIN, &reads, &writes, params));
+        let wires = wires![tension, beams: beams.table, totals: self.totals];
+        let kernel = Code::of::<energy::Axial>();
+        self.b.plan.collect.push(Stage::new("axial energy", kernel, (sums.parts, GRAIN), &wires, params).beside());
         sums
     }
 }
 
 /// Adds the stages of totals; returns where they are, and the slip of contact points.
-pub(super) fn add(b: &mut Builder, s: &Sources) -> (Totals, [Option<Buffer>; 2]) {
-    let (nodes, beams, first) = (s.mesh.nodes.len(), s.mesh.beams(), s.mesh.first_thread_node());
+pub(super) fn add(b: &mut Builder, p: &Parts) -> (Totals, [Option<Buffer>; 2]) {
+    let Parts { tables, nodes, hexes, beams, bends, .. } = p;
     let buffer = b.scratch("totals", 0);
-    let Active { friction, periodic, .. } = s.active;
+    let Active { friction, periodic, .. } = tables.active;
+    let points = p.points();
+    let face_sums = p.faces().map(|faces| faces.map(|faces| faces.sums));
     let mut slip = [None; 2];
     for (kind, name) in [(0, "slip of thread points"), (1, "slip of yarn points")] {
-        slip[kind] = s.face_sums[kind].filter(|_| friction).map(|sums| {
-            let slip = b.scratch(name, s.points[kind]);
-            let own = Access::Own { planes: 1, stride: 1 };
-            let kernel = flagged!(slip::Slip; periodic);
-            b.plan.collect.push(coded(kernel, "slip", s.points[kind], 512, &[sums], &[(slip, own)], [0u32; 0]));
-            slip
+        slip[kind] = face_sums[kind].filter(|_| friction).map(|sums| {
+            let slipped = b.scratch(name, points[kind]);
+            let (wires, kernel) = (wires![sums, slipped], flagged!(slip::Slip; periodic));
+            b.plan.collect.push(Stage::new("slip", kernel, (points[kind], 512), &wires, [0u32; 0]).beside());
+            slipped
         });
     }
-    let jacobian = s.hex_energy.map(|energy| {
-        let mut used = vec![0; s.hex_blocks];
-        s.hex_place.iter().for_each(|(block, _)| used[*block] += 1);
+    let hex_blocks = tables.solids.headers.len();
+    let jacobian = hexes.energy.map(|energy| {
+        let mut used = vec![0; hex_blocks];
+        tables.solids.place.iter().for_each(|(block, _)| used[*block] += 1);
         (energy, b.indices("lanes in use", used))
     });
     let c = &mut Collector { b, totals: buffer };
     let mut contact = Vec::new();
-    for (sums, points) in s.face_sums.into_iter().zip(s.points) {
+    for (sums, points) in face_sums.into_iter().zip(points) {
         let Some(sums) = sums else { continue };
         contact.push(c.taken(sums, Columns::rows(points, sums::sums(friction, periodic)), true));
     }
-    if let Some(sums) = s.pair_sums {
-        contact.push(c.taken(sums, Columns::rows(beams, sums::sums(friction, periodic)), false));
+    if let Some(pairs) = p.pairs() {
+        contact.push(c.taken(pairs.sums, Columns::rows(beams.count, sums::sums(friction, periodic)), false));
     }
     let mut stress = Vec::new();
-    if let Some(virial) = s.hex_virial {
-        stress.push(c.taken(virial, Columns::blocks(s.hex_blocks, VIRIAL, 9), false));
+    if let Some(virial) = hexes.virial {
+        stress.push(c.taken(virial, Columns::blocks(hex_blocks, VIRIAL, 9), false));
     }
-    for (virial, count) in [(s.beam_virial, beams), (s.bend_virial, s.bends)] {
-        stress.extend(virial.map(|virial| c.taken(virial, Columns::rows(count, 9), false)));
+    let of_bends = bends.as_ref().and_then(|bends| Some((bends.virial?, bends.count)));
+    for (virial, count) in beams.virial.map(|virial| (virial, beams.count)).into_iter().chain(of_bends) {
+        stress.push(c.taken(virial, Columns::rows(count, 9), false));
     }
+    let held = p.held.as_ref();
+    let ties = p.contact.as_ref().and_then(|contact| contact.ties);
+    let first = nodes.first_thread;
     let part = |c: &mut Collector, range: Range<usize>| {
-        s.added_mass.filter(|_| !range.is_empty()).map(|added| c.kept(added, Columns::range(range)))
+        p.assembled.added_mass.filter(|_| !range.is_empty()).map(|added| c.kept(added, Columns::range(range)))
     };
+    let works = tables.active.works();
     let totals = Totals {
         buffer,
-        work: s.work.map(|work| c.taken(work, Columns::planes(nodes, s.active.works().count()), false)),
-        works: s.active.works(),
-        thermal: s.beam_work.map(|work| c.taken(work, Columns::range(0..beams), false)),
-        reaction: s.reaction_work.map(|work| c.taken(work, Columns::range(0..s.conditions), false)),
+        work: nodes.work.map(|work| c.taken(work, Columns::planes(nodes.count, works.count()), false)),
+        works,
+        thermal: beams.work.map(|work| c.taken(work, Columns::range(0..beams.count), false)),
+        reaction: held.map(|held| c.taken(held.work, Columns::range(0..held.count), false)),
         stress,
         contact,
-        ties: s.ties.map(|(energy, count)| c.kept(energy, Columns::range(0..count))),
-        modes: s.hex_energy.map(|e| c.kept(e, Columns::blocks(s.hex_blocks, ENERGY, 4))),
-        hourglass: s.hex_hourglass.map(|e| c.kept(e, Columns::blocks(s.hex_blocks, HOURGLASS, 1))),
-        axial: s.beam_tension.map(|tension| c.axial(tension, s)),
-        bending: s.bend_energy.map(|e| c.kept(e, Columns::range(0..s.bends))),
-        kinetic: c.kinetic(s, false),
-        kinetic_total: s.mesh.period.map(|_| c.kinetic(s, true)),
-        added: [part(c, 0..first), part(c, first..nodes)],
+        ties: ties.map(|(energy, count)| c.kept(energy, Columns::range(0..count))),
+        modes: hexes.energy.map(|e| c.kept(e, Columns::blocks(hex_blocks, ENERGY, 4))),
+        hourglass: hexes.hourglass.map(|e| c.kept(e, Columns::blocks(hex_blocks, HOURGLASS, 1))),
+        axial: beams.tension.map(|tension| c.axial(tension, beams)),
+        bending: bends.as_ref().map(|bends| c.kept(bends.energy, Columns::range(0..bends.count))),
+        kinetic: c.kinetic(p, false),
+        kinetic_total: periodic.then(|| c.kinetic(p, true)),
+        added: [part(c, 0..first), part(c, first..nodes.count)],
         jacobian: jacobian.map(|(energy, used)| {
-            let jacobians = Columns { start: 4 * LANES, ..Columns::blocks(s.hex_blocks, ENERGY, 1) };
+            let jacobians = Columns { start: 4 * LANES, ..Columns::blocks(hex_blocks, ENERGY, 1) };
             c.largest(energy, jacobians, Some(used))
         }),
-        stiffness: c.largest(s.weighed_limit, Columns::range(0..nodes), None),
+        stiffness: c.largest(p.weighed_limit, Columns::range(0..nodes.count), None),
     };
     (totals, slip)
 }

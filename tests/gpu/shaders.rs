@@ -8,9 +8,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
 use std::panic::catch_unwind;
 use tricot::kernel::buffer::{Description, Kind};
+use tricot::kernel::interface::Access;
 use tricot::kernel::row::Row;
 use tricot::kernel::shader::{ENTRY, Text};
-use tricot::kernel::stage::{Access, Stage};
+use tricot::kernel::stage::Stage;
 use tricot::run::simulation;
 use tricot::simulate::BackendConfig;
 use tricot::{conditions, contact, dynamics, elements};
@@ -73,7 +74,7 @@ fn stages() -> Vec<(String, Stage, Vec<Description>)> {
             simulation(&loaded(&case), BackendConfig::default()).unwrap_or_else(|e| panic!("{scene}: {e}"));
         let plan = &simulation.model.plan;
         for stage in [&plan.step, &plan.search, &plan.watch, &plan.diagnose, &plan.collect].into_iter().flatten() {
-            all.push((format!("{scene}, {}", stage.name), stage.clone(), plan.buffers.clone()));
+            all.push((format!("{scene}, {}", stage.name()), stage.clone(), plan.buffers.clone()));
         }
     }
     all
@@ -141,13 +142,14 @@ fn members(module: &naga::Module, name: &str) -> Option<(Vec<Field<String>>, u32
 
 /// Compares what the twin of a stage sees with what the stage binds.
 fn check(name: &str, stage: &Stage, buffers: &[Description]) {
-    let shader = stage.kernel.shader;
+    let shader = stage.kernel().shader;
     let text = Text::of(stage).unwrap_or_else(|e| panic!("{name}: {e}"));
     let (module, info) = text.module().unwrap_or_else(|e| panic!("{name}: {e}"));
     let entry = module.entry_points.iter().position(|e| e.name == ENTRY);
     let entry = entry.unwrap_or_else(|| panic!("{name}: no entry point"));
     let uses = info.get_entry_point(entry);
-    let kinds = stage.reads.iter().map(|b| (b, None)).chain(stage.writes.iter().map(|(b, access)| (b, Some(access))));
+    let (reads, writes) = (stage.reads(), stage.writes());
+    let kinds = reads.iter().map(|b| (b, None)).chain(writes.iter().map(|(b, access)| (b, Some(access))));
     let expected: BTreeMap<u32, _> = (0..).zip(kinds).collect();
     let mut found = Vec::new();
     for (handle, variable) in module.global_variables.iter() {
@@ -164,12 +166,12 @@ fn check(name: &str, stage: &Stage, buffers: &[Description]) {
             TypeInner::Atomic(scalar) => (scalar, true),
             ref other => panic!("{shown} holds {other:?}"),
         };
-        let kind = match buffers[buffer.0].kind {
+        let kind = match buffers[buffer.number()].kind {
             Kind::Scalar => ScalarKind::Float,
             Kind::Int => ScalarKind::Sint,
             Kind::Uint => ScalarKind::Uint,
         };
-        assert_eq!((scalar.kind, scalar.width, stride), (kind, 4, 4), "{shown}: {}", buffers[buffer.0].name);
+        assert_eq!((scalar.kind, scalar.width, stride), (kind, 4, 4), "{shown}: {}", buffers[buffer.number()].name);
         assert_eq!(atomic, access == &Some(&Access::Atomic), "{shown}: atomic");
         assert!(!uses[handle].is_empty(), "{shown} is bound and not used");
         found.push(binding.binding);
@@ -181,7 +183,7 @@ fn check(name: &str, stage: &Stage, buffers: &[Description]) {
         let names: Vec<Field<&str>> = members.iter().map(|(n, o, s)| (n.as_str(), *o, *s)).collect();
         assert_eq!(names, expected, "{name}: parameters");
         assert!(
-            (span as usize).next_multiple_of(16) == stage.params.len().next_multiple_of(16),
+            (span as usize).next_multiple_of(16) == stage.params().len().next_multiple_of(16),
             "{name}: {span} bytes"
         );
     }
@@ -198,11 +200,24 @@ fn check(name: &str, stage: &Stage, buffers: &[Description]) {
 #[test]
 fn every_twin_compiles_and_sees_what_its_stage_binds() {
     let (mut seen, mut failed) = (BTreeSet::new(), 0);
-    for (name, stage, buffers) in stages() {
-        seen.insert((stage.kernel.shader.file, stage.kernel.shader.kernel));
-        failed += usize::from(catch_unwind(|| check(&name, &stage, &buffers)).is_err());
+    let stages = stages();
+    for (name, stage, buffers) in &stages {
+        seen.insert((stage.kernel().shader.file, stage.kernel().shader.kernel));
+        failed += usize::from(catch_unwind(|| check(name, stage, buffers)).is_err());
     }
     println!("{seen:#?}");
+    let mut unused = BTreeSet::new();
+    let mut used = BTreeSet::new();
+    for (_, stage, _) in &stages {
+        let text = Text::of(stage).unwrap_or_else(|e| panic!("{e}")).text;
+        let is_declared = |name: &str| text.contains(&format!("const {name}: "));
+        let names = stage.kernel().shader.constants.iter().copied().flatten().map(|constant| constant.name);
+        let (here, not_here): (Vec<_>, Vec<_>) = names.partition(|name| is_declared(name));
+        used.extend(here);
+        unused.extend(not_here);
+    }
+    let unused: Vec<_> = unused.difference(&used).collect();
+    assert!(unused.is_empty(), "no twin uses {unused:?}");
     assert!(seen.len() == 31, "{} kinds of stages", seen.len());
     assert_eq!(failed, 0, "stages without a twin that fits; see above");
 }

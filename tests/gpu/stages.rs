@@ -14,10 +14,11 @@ use tricot::backend::gpu::{Device, Gpu};
 use tricot::contact::{EMPTY, grid, status};
 use tricot::elements::LANES;
 use tricot::kernel::buffer::{Buffer, Description, Kind};
+use tricot::kernel::interface::Access;
 use tricot::kernel::lane::Isa;
 use tricot::kernel::position::QUANTUM;
 use tricot::kernel::row::Row;
-use tricot::kernel::stage::{Access, Stage};
+use tricot::kernel::stage::Stage;
 use tricot::plan::Model;
 use tricot::run;
 use tricot::simulate::{BackendConfig, Simulation};
@@ -126,7 +127,7 @@ enum Exception {
 
 /// The exception that a buffer is, if any.
 fn exception(model: &Model, buffer: Buffer) -> Option<Exception> {
-    Some(match model.plan.buffers[buffer.0].name {
+    Some(match model.plan.describe(buffer).name {
         "hex corner forces" | "hex stiffness bounds" | "hex energies" | "hourglass energies" | "hex stress sums" => {
             Exception::Lanes(LANES)
         }
@@ -152,7 +153,7 @@ fn holds_bits(place: usize) -> bool {
 
 /// How the numbers of a buffer agree that a stage writes.
 fn rules(model: &Model, stage: &Stage, buffer: Buffer, access: Access) -> Vec<Rule> {
-    let Description { name, kind, len, .. } = model.plan.buffers[buffer.0];
+    let &Description { name, kind, len, .. } = model.plan.describe(buffer);
     let exception = exception(model, buffer);
     let all = |rule: &dyn Fn(usize) -> Rule| (0..len).map(rule).collect();
     match exception {
@@ -166,13 +167,13 @@ fn rules(model: &Model, stage: &Stage, buffer: Buffer, access: Access) -> Vec<Ru
     let is_own = |access: &Access| matches!(access, Access::Own { .. });
     // where no item here owns them, as the items of another stage do
     let elsewhere = || {
-        let mut writes = stages(model).flat_map(|stage| &stage.writes);
+        let mut writes = stages(model).flat_map(|stage| stage.writes());
         writes.find(|(b, access)| *b == buffer && is_own(access)).map(|(_, access)| *access)
     };
     let Some(Access::Own { planes, stride }) = Some(access).filter(is_own).or_else(elsewhere) else {
         panic!("`{name}`: what are its columns?")
     };
-    let items = if is_own(&access) { stage.first..stage.first + stage.count } else { 0..len };
+    let items = if is_own(&access) { stage.items() } else { 0..len };
     let (lanes, slots) = match exception {
         Some(Exception::Lanes(lanes)) => (lanes, stride),
         Some(Exception::Slots(slots) | Exception::Repeats(slots)) => (1, slots),
@@ -212,15 +213,14 @@ fn stages(model: &Model) -> impl Iterator<Item = &Stage> {
 
 /// The numbers of a buffer, as they are compared.
 fn numbers(model: &Model, backend: &dyn Backend, buffer: Buffer) -> Vec<f64> {
-    let plain = match model.plan.buffers[buffer.0].kind {
+    let plain = match model.plan.describe(buffer).kind {
         Kind::Scalar => backend.scalars(buffer),
         Kind::Int => backend.ints(buffer).into_iter().map(f64::from).collect(),
         Kind::Uint => backend.uints(buffer).into_iter().map(f64::from).collect(),
     };
     match exception(model, buffer) {
         Some(Exception::Lists) => {
-            let named = |name| model.plan.buffers.iter().position(|b| b.name == name).map(Buffer);
-            let counts = backend.uints(named("items of cells").expect("lists have counts"));
+            let counts = backend.uints(model.plan.named("items of cells").expect("lists have counts"));
             sorted(plain, &counts)
         }
         Some(Exception::Slots(size)) => split(plain, size),
@@ -347,26 +347,26 @@ fn compare(device: &Arc<Device>, simulation: &Simulation, findings: &mut Finding
     let mut gpu = Gpu::new(Arc::clone(device), &plan.buffers).unwrap_or_else(|e| panic!("{e}"));
     let mut cpu = Cpu::<f32>::new(&plan.buffers, 1, Isa::best());
     let mut double = Cpu::<f64>::new(&plan.buffers, 1, Isa::best());
-    for buffer in (0..plan.buffers.len()).map(Buffer) {
+    for buffer in plan.all() {
         cpu.set_bytes(buffer, &simulation.backend().bytes(buffer));
     }
     // what adds up over steps starts at zero: old sums would hide what this one adds
-    for (buffer, access) in plan.collect.iter().flat_map(|stage| &stage.writes) {
+    for (buffer, access) in plan.collect.iter().flat_map(|stage| stage.writes()) {
         if *access == Access::Scatter && *buffer != model.totals.buffer {
             cpu.clear(*buffer);
         }
     }
     let (time, dt) = (simulation.time(), simulation.dt());
     let row = Row { approach: 100.0, ..simulation.schedule.row(time, dt, dt, |_| [1.0; 2]) };
-    for stage in stages(model).filter(|stage| stage.count > 0) {
-        for buffer in stage.reads.iter().chain(stage.writes.iter().map(|(b, _)| b)) {
+    for stage in stages(model).filter(|stage| !stage.items().is_empty()) {
+        for buffer in stage.reads().iter().chain(stage.writes().iter().map(|(b, _)| b)) {
             gpu.set_bytes(*buffer, &cpu.bytes(*buffer));
-            match plan.buffers[buffer.0].kind {
+            match plan.describe(*buffer).kind {
                 Kind::Scalar => double.set_scalars(*buffer, &cpu.scalars(*buffer)),
                 _ => double.set_bytes(*buffer, &cpu.bytes(*buffer)),
             }
         }
-        let compared = stage.writes.iter().filter(|(buffer, _)| exception(model, *buffer) != Some(Exception::Whole));
+        let compared = stage.writes().iter().filter(|(buffer, _)| exception(model, *buffer) != Some(Exception::Whole));
         let before: Vec<_> = compared.clone().map(|(buffer, _)| numbers(model, &cpu, *buffer)).collect();
         let backends: [&mut dyn Backend; 3] = [&mut gpu, &mut cpu, &mut double];
         backends.into_iter().for_each(|b| b.run(std::slice::from_ref(stage), &[row]));
@@ -381,7 +381,7 @@ fn compare(device: &Arc<Device>, simulation: &Simulation, findings: &mut Finding
                 }
             }
             let found = Found::new(&rules(model, stage, *buffer, *access), [&gpu, &cpu, &double]);
-            let known = findings.entry((stage.name, plan.buffers[buffer.0].name)).or_default();
+            let known = findings.entry((stage.name(), plan.describe(*buffer).name)).or_default();
             *known = std::mem::take(known).or(Found { changed, ..found });
         }
     }
@@ -443,8 +443,8 @@ fn wrong(stage: &str, buffer: &str, number: impl Fn(usize) -> f64, change: impl 
             .unwrap()
             .model
     });
-    let stage = stages(&MODEL).find(|s| s.name == stage).unwrap();
-    let (buffer, access) = stage.writes.iter().find(|(b, _)| MODEL.plan.buffers[b.0].name == buffer).unwrap();
+    let stage = stages(&MODEL).find(|s| s.name() == stage).unwrap();
+    let (buffer, access) = stage.writes().iter().find(|(b, _)| MODEL.plan.describe(*b).name == buffer).unwrap();
     let rules = rules(&MODEL, stage, *buffer, *access);
     let theirs: Vec<f64> = (0..rules.len()).map(number).collect();
     let mut ours = theirs.clone();

@@ -336,9 +336,9 @@ fn full_integration_has_no_trace_of_hourglass_control() {
         let texts = stages.iter().map(|s| Text::of(s).unwrap().text);
         let traces = texts.filter(|t| t.contains("hourglass")).count()
             + plan.buffers.iter().filter(|b| b.name.contains("hourglass")).count()
-            + stages.iter().filter(|s| s.name.contains("reduced")).count()
+            + stages.iter().filter(|s| s.name().contains("reduced")).count()
             + simulation.energies().columns().filter(|(name, _)| *name == "hourglass_mj").count();
-        let full = stages.iter().filter(|s| s.kernel.shader.file == "elements/hex8").count();
+        let full = stages.iter().filter(|s| s.kernel().shader.file == "elements/hex8").count();
         println!("{traces} traces of hourglass control, {full} stages of full integration");
         assert_eq!((traces > 0, full > 0), (expected, !expected));
     }

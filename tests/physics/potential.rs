@@ -75,7 +75,7 @@ impl Scene {
         }
         self.simulation.set_fluctuations(&moved);
         let model = &self.simulation.model;
-        for buffer in (0..model.plan.buffers.len()).map(Buffer) {
+        for buffer in model.plan.all() {
             self.cpu.set_bytes(buffer, &self.simulation.backend().bytes(buffer));
         }
         let faces = model.buffers.faces[0].unwrap();
@@ -87,7 +87,7 @@ impl Scene {
         self.cpu.set_bytes(faces.found, bytemuck::cast_slice(&never));
         let row = self.simulation.schedule.row(0.0, 1e-9, 1e-9, |_| [1.0; 2]);
         self.cpu.run(&model.plan.search, &[row]);
-        let contact = model.plan.step.iter().filter(|stage| stage.name == "thread-yarn contact").cloned();
+        let contact = model.plan.step.iter().filter(|stage| stage.name() == "thread-yarn contact").cloned();
         self.cpu.run(&contact.collect::<Vec<_>>(), &[row]);
         let status = self.cpu.uints(model.buffers.status);
         assert_eq!(status[status::FLAGS] & (status::SLOTS_FULL | status::CELL_FULL), 0, "tables are full");
@@ -112,8 +112,8 @@ impl Scene {
     }
 
     fn quantum(&self) -> f64 {
-        let stage = self.simulation.model.plan.step.iter().find(|s| s.name == "thread-yarn contact").unwrap();
-        let params: tricot::contact::Params = bytemuck::pod_read_unaligned(&stage.params);
+        let stage = self.simulation.model.plan.step.iter().find(|s| s.name() == "thread-yarn contact").unwrap();
+        let params: tricot::contact::Params = bytemuck::pod_read_unaligned(stage.params());
         f64::from(params.force_quantum)
     }
 }

@@ -56,7 +56,7 @@ fn free() -> Value {
 fn copy<R: Run>(simulation: &Simulation) -> Cpu<R> {
     let plan = &simulation.model.plan;
     let mut backend = Cpu::<R>::new(&plan.buffers, 1, Isa::best());
-    for buffer in (0..plan.buffers.len()).map(Buffer) {
+    for buffer in plan.all() {
         backend.set_bytes(buffer, &simulation.backend().bytes(buffer));
     }
     let row = simulation.schedule.row(simulation.time(), simulation.dt(), simulation.dt(), |_| [1.0; 2]);
@@ -66,7 +66,7 @@ fn copy<R: Run>(simulation: &Simulation) -> Cpu<R> {
 }
 
 fn named(simulation: &Simulation, name: &str) -> Option<Buffer> {
-    simulation.model.plan.buffers.iter().position(|b| b.name == name).map(Buffer)
+    simulation.model.plan.named(name)
 }
 
 /// Runs a case to a time, then compares everything that is collected.
@@ -77,10 +77,9 @@ fn check<R: Run>(case: &Value, until: f64, precision: Precision, rounding: f64) 
     let model = &simulation.model;
     let (plan, places, nodes) = (&model.plan, &model.totals, simulation.mesh().nodes.len());
     let row = simulation.schedule.row(simulation.time(), simulation.dt(), simulation.dt(), |_| [1.0; 2]);
-    let before: Vec<Vec<f64>> = (0..plan.buffers.len())
-        .map(|b| if plan.buffers[b].kind == Kind::Scalar { backend.scalars(Buffer(b)) } else { vec![] })
-        .collect();
-    let get = |name: &str| named(&simulation, name).map(|b| before[b.0].clone()).unwrap_or_default();
+    let before: Vec<Vec<f64>> =
+        plan.all().map(|b| if plan.describe(b).kind == Kind::Scalar { backend.scalars(b) } else { vec![] }).collect();
+    let get = |name: &str| named(&simulation, name).map(|b| before[b.number()].clone()).unwrap_or_default();
     backend.run(&plan.collect, &[row]);
     let totals = backend.scalars(places.buffer);
     println!("{} numbers in the totals of {nodes} nodes, {} hexes", totals.len(), simulation.mesh().hexes());
@@ -175,9 +174,9 @@ fn check<R: Run>(case: &Value, until: f64, precision: Precision, rounding: f64) 
     assert_eq!((-negative, jacobian(&model.hex_place[model.hex_at[at]])), (smallest, smallest));
     assert!(smallest < 0.9999, "nothing is deformed");
 
-    for stage in plan.collect.iter().filter(|stage| stage.name == "totals taken") {
-        let taken = stage.writes[0].0;
-        assert!(backend.scalars(taken).iter().all(|x| *x == 0.0), "{} is not set back", plan.buffers[taken.0].name);
+    for stage in plan.collect.iter().filter(|stage| stage.name() == "totals taken") {
+        let taken = stage.writes()[0].0;
+        assert!(backend.scalars(taken).iter().all(|x| *x == 0.0), "{} is not set back", plan.describe(taken).name);
     }
     for (slip, [before, sums]) in model
         .buffers

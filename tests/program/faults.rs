@@ -10,10 +10,11 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use tricot::contact::{EMPTY, penalty};
 use tricot::error::Error;
-use tricot::kernel::buffer::Buffer;
+use tricot::kernel::buffer::Kind;
+use tricot::kernel::interface::Slot;
 use tricot::kernel::lane::{Lane, Real};
 use tricot::kernel::shader::Shader;
-use tricot::kernel::stage::{Access, Code, Io, Kernel, Stage};
+use tricot::kernel::stage::{Io, Kernel, Stage};
 use tricot::output::checkpoint::Checkpoint;
 use tricot::settings::integration::Precision::{F32, F64};
 
@@ -30,6 +31,7 @@ struct Spoil;
 
 impl Kernel for Spoil {
     const SHADER: Shader = Shader::new("none", "none");
+    const SLOTS: &'static [Slot] = &[Slot::planes("acceleration", Kind::Scalar, 3)];
 
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let mut acceleration = io.own::<L::Scalar>(0);
@@ -47,20 +49,10 @@ fn a_force_that_is_not_a_number_is_found_with_its_body() {
         advance(&mut simulation, 1e-5);
         let energy = simulation.energies().output();
         let plan = &mut simulation.model.plan;
-        let forces = plan.buffers.iter().position(|b| b.name == "acceleration").unwrap();
-        let after = plan.step.iter().position(|stage| stage.name == "assemble").unwrap() + 1;
-        let spoil = Stage {
-            name: "spoil",
-            first: STRUCK,
-            count: 1,
-            grain: 1,
-            reads: vec![],
-            writes: vec![(Buffer(forces), Access::Own { planes: 3, stride: 1 })],
-            params: vec![],
-            constants: vec![],
-            kernel: Code::of::<Spoil>(),
-            waits: true,
-        };
+        let forces = plan.named("acceleration").unwrap();
+        let after = plan.step.iter().position(|stage| stage.name() == "assemble").unwrap() + 1;
+        // SAFETY: the kernel writes to its own items only
+        let spoil = unsafe { Stage::foreign::<Spoil>("spoil", STRUCK..STRUCK + 1, &[("acceleration", forces)]) };
         plan.step.insert(after, spoil);
         let Err(Error::Guard(guard)) = simulation.advance(1e-3, |_| false) else { panic!("no guard") };
         println!("{guard}");

@@ -86,8 +86,8 @@ fn pulling_balances_and_is_slow_and_the_force_rises() {
 fn every_cut_is_held_once_and_free_ends_leave_no_trace() {
     let ties = |ends_are: &str| {
         let simulation = started(&[&format!("domain.specimen.thread_ends={ends_are}")]);
-        let stages = simulation.model.plan.step.iter().filter(|stage| stage.name == "ties");
-        (stages.map(|stage| stage.count).sum::<usize>(), simulation.mesh().clone())
+        let stages = simulation.model.plan.step.iter().filter(|stage| stage.name() == "ties");
+        (stages.map(|stage| stage.items().len()).sum::<usize>(), simulation.mesh().clone())
     };
     assert_eq!(ties("free").0, 0);
     let (count, mesh) = ties("held");

@@ -20,7 +20,7 @@ use crate::kernel::buffer::{Array, Buffer, Description, Initial, Kind};
 use crate::kernel::exact::{self, Exact};
 use crate::kernel::lane::Isa;
 use crate::kernel::row::Row;
-use crate::kernel::stage::{Access, Code, Stage};
+use crate::kernel::stage::{Code, Stage, wires};
 use pipeline::Bound;
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -386,33 +386,23 @@ impl Backend for Gpu {
 /// Whether the device does integers and sums with remainders as the CPU does, bit by bit.
 fn self_test(device: &Arc<Device>) -> Result<()> {
     const ITEMS: usize = 512;
-    let (quanta, increments): (Vec<i32>, Vec<f64>) = (0..ITEMS).map(exact::start).unzip();
+    let (starts, steps): (Vec<i32>, Vec<f64>) = (0..ITEMS).map(exact::start).unzip();
     let description = |name, kind, len, initial| Description { name, kind, len, persistent: false, initial };
     let buffers = [
-        description("increments", Kind::Scalar, ITEMS, Initial::Scalar(increments)),
-        description("quanta", Kind::Int, ITEMS, Initial::Int(quanta)),
+        description("increments", Kind::Scalar, ITEMS, Initial::Scalar(steps)),
+        description("quanta", Kind::Int, ITEMS, Initial::Int(starts)),
         description("remainders", Kind::Scalar, ITEMS, Initial::Zero),
         description("sum", Kind::Int, 1, Initial::Zero),
     ];
-    let own = Access::Own { planes: 1, stride: 1 };
-    let stage = Stage {
-        name: "self-test",
-        first: 0,
-        count: ITEMS,
-        grain: ITEMS,
-        reads: vec![Buffer(exact::INCREMENTS)],
-        writes: vec![(Buffer(1), own), (Buffer(2), own), (Buffer(3), Access::Atomic)],
-        params: Vec::new(),
-        constants: Vec::new(),
-        kernel: Code::of::<Exact>(),
-        waits: true,
-    };
+    let [increments, quanta, remainders, sum] = [0, 1, 2, 3].map(Buffer);
+    let wires = wires![increments, quanta, remainders, sum];
+    let stage = Stage::new("self-test", Code::of::<Exact>(), (ITEMS, ITEMS), &wires, [0u32; 0]);
     let mut gpu = Gpu::new(Arc::clone(device), &buffers)?;
     let mut cpu = Cpu::<f32>::new(&buffers, 1, Isa::Scalar);
     let both: [&mut dyn Backend; 2] = [&mut gpu, &mut cpu];
     let [ours, theirs] = both.map(|backend| {
         backend.run(std::slice::from_ref(&stage), &[Row::default()]);
-        [1, 2, 3].map(|buffer| backend.bytes(Buffer(buffer)))
+        [quanta, remainders, sum].map(|buffer| backend.bytes(buffer))
     });
     if let Some(fault) = device.fault() {
         return Err(Error::Device(fault));

@@ -1,0 +1,178 @@
+//! From forces to motion: assembly, prescribed motion, fibre lines, integration.
+
+use super::Tables;
+use super::beams::{Beams, Bends};
+use super::builder::{Builder, NODE_GRAIN};
+use super::contact::ContactParts;
+use super::hexes::Hexes;
+use super::nodes::Nodes;
+use crate::conditions::prescribed::{self, Prescribed};
+use crate::dynamics::assemble::{self, Assemble};
+use crate::dynamics::fibre_lines::{self, FibreLines, Group};
+use crate::dynamics::integrate::{self, Integrate};
+use crate::elements::LANES;
+use crate::kernel::buffer::{Buffer, Initial, Kind};
+use crate::kernel::position::quanta;
+use crate::kernel::stage::{Code, Stage, flagged, wires};
+use crate::mesh::Mesh;
+
+/// What assembly leaves for later stages.
+pub(super) struct Assembled {
+    /// Slots of thread nodes.
+    pub thread_slots: Buffer,
+    /// What contact-aware mass adds, tonne.
+    pub added_mass: Option<Buffer>,
+    /// Least mass for the stiffness of elements, s².
+    pub mass_per_stiffness: f32,
+}
+
+/// Adds assembly to accelerations.
+pub(super) fn assemble(
+    b: &mut Builder,
+    t: &Tables,
+    nodes: &Nodes,
+    (hexes, beams, bends): (&Hexes, &Beams, Option<&Bends>),
+    contact: Option<&ContactParts>,
+) -> Assembled {
+    let solid_slots = b.indices("corner slots of solid nodes", t.solids.slots.clone());
+    let thread_slots = b.indices("slots of thread nodes", t.threads.slots.clone());
+    let contact_mass = t.scene.effects.contact_mass.as_ref().filter(|_| t.active.contact_mass);
+    let added_mass = contact_mass.map(|_| b.add("added mass", Kind::Scalar, nodes.count, true, Initial::Zero));
+    let params = assemble::Params {
+        first_thread: nodes.first_thread as u32,
+        gravity: t.gravity(),
+        force_quantum: contact.map_or(1.0, |c| c.params.force_quantum),
+        stiffness_quantum: contact.map_or(1.0, |c| c.params.stiffness_quantum),
+        mass_factor: contact_mass.map_or(0.0, |c| c.factor as f32),
+        mass_memory: contact_mass.map_or(0.0, |c| c.memory as f32),
+        mass_per_stiffness: contact_mass.map_or(0.0, |c| (0.25 * c.least_limit_s * c.least_limit_s) as f32),
+    };
+    let &Nodes { mass, true_mass, acceleration, inverse_mass, status, .. } = nodes;
+    let wires = wires![
+        solid_slots,
+        hex_force: hexes.force,
+        thread_slots,
+        beam_force: beams.force,
+        mass,
+        bend_slots: bends.map(|bends| bends.slots),
+        bend_force: bends.map(|bends| bends.force),
+        element_stiffness: hexes.limit,
+        true_mass,
+        acceleration,
+        inverse_mass,
+        contact_force: contact.map(|c| c.force),
+        contact_stiffness: contact.map(|c| c.stiffness),
+        added_mass,
+        status,
+    ];
+    let active = t.active;
+    let kernel = flagged!(Assemble; contact.is_some(), active.contact_mass, active.bending, active.gravity);
+    b.plan.step.push(Stage::new("assemble", kernel, (nodes.count, NODE_GRAIN), &wires, params));
+    Assembled { thread_slots, added_mass, mass_per_stiffness: params.mass_per_stiffness }
+}
+
+/// Buffers of prescribed nodes.
+pub(super) struct Held {
+    pub count: usize,
+    pub nodes: Buffer,
+    pub reaction: Buffer,
+    /// Work of reactions.
+    pub work: Buffer,
+}
+
+impl Held {
+    /// Adds prescribed motion, in a scene that has some.
+    pub fn add(b: &mut Builder, t: &Tables, nodes: &Nodes) -> Option<Self> {
+        let count = t.conditions.count();
+        if count == 0 {
+            return None;
+        }
+        let at = b.indices("prescribed nodes", t.conditions.nodes.clone());
+        let targets = b.table("prescribed displacements", t.conditions.targets.clone());
+        let (reaction, work) = (b.scratch("reactions", 3 * count), b.scratch("work of reactions", count));
+        let &Nodes { velocity, mass, acceleration, inverse_mass, .. } = nodes;
+        let wires = wires![nodes: at, targets, velocity, mass, acceleration, inverse_mass, work, reactions: reaction];
+        let params = prescribed::Params { first_thread: nodes.first_thread as u32 };
+        let kernel = flagged!(Prescribed; t.active.damping);
+        b.plan.step.push(Stage::new("prescribed", kernel, (count, NODE_GRAIN), &wires, params));
+        Some(Self { count, nodes: at, reaction, work })
+    }
+}
+
+/// Adds fibre lines, in a scene that has some; what they add to accelerations.
+pub(super) fn fibre_lines(b: &mut Builder, t: &Tables, nodes: &Nodes, held: Option<&Held>) -> Option<Buffer> {
+    let lines = t.fibre_lines()?;
+    let correction = b.scratch("line correction", 3 * nodes.count);
+    let groups = b.indices("fibre lines", bytemuck::cast_slice(&t.lines).to_vec());
+    let stiffness = b.table("line stiffness", t.line_stiffness());
+    let &Nodes { reference, quanta, remainder, acceleration, inverse_mass, .. } = nodes;
+    let wires = wires![groups, stiffness, reference, quanta, remainder, acceleration, inverse_mass, correction];
+    let params = fibre_lines::Params { beta: lines.beta as f32 };
+    let longest = t.lines.iter().map(|g| g.stations as usize).max().unwrap_or(1);
+    let kernel = flagged!(FibreLines; t.active.periodic);
+    let stage = Stage::new("fibre lines", kernel, (t.lines.len(), 1), &wires, params);
+    b.plan.step.push(Stage { constants: vec![("STATIONS", longest)], ..stage });
+    if let Some(held) = held {
+        let wires = wires![nodes: held.nodes, correction];
+        let kernel = Code::of::<prescribed::Hold>();
+        b.plan.step.push(Stage::new("hold", kernel, (held.count, NODE_GRAIN), &wires, [0u32; 0]));
+    }
+    Some(correction)
+}
+
+/// Adds integration.
+pub(super) fn integrate(
+    b: &mut Builder,
+    t: &Tables,
+    nodes: &Nodes,
+    added_mass: Option<Buffer>,
+    correction: Option<Buffer>,
+) {
+    let params = integrate::Params { first_thread: nodes.first_thread as u32, gravity: t.gravity() };
+    let &Nodes { acceleration, mass, true_mass, velocity, quanta, remainder, work, .. } = nodes;
+    let inverse_mass = added_mass.map(|_| nodes.inverse_mass);
+    let wires = wires![acceleration, mass, inverse_mass, correction, true_mass, velocity, quanta, remainder, work];
+    let active = t.active;
+    let kernel = flagged!(Integrate; active.fibre_lines, active.gravity, active.damping, active.contact_mass);
+    b.plan.step.push(Stage::new("integrate", kernel, (nodes.count, NODE_GRAIN), &wires, params));
+}
+
+/// Groups of up to sixteen lines of equal length with consecutive nodes.
+pub(super) fn line_groups(mesh: &Mesh, with_threads: bool) -> Vec<Group> {
+    let shift = |wrap: Option<[i32; 2]>| {
+        let period = mesh.period.unwrap_or_default().map(quanta);
+        let wrap = wrap.unwrap_or_default();
+        [wrap[0] * period[0], wrap[1] * period[1]]
+    };
+    let blocks = mesh.blocks.iter().map(|b| (b.first, b.lines(), b.stations(), b.wrap));
+    let threads = mesh.threads.iter().filter(|_| with_threads).map(|t| (t.first, 1, t.count, t.wrap));
+    let mut groups: Vec<Group> = Vec::new();
+    for (first, lines, stations, wrap) in threads.chain(blocks) {
+        // a closed line of two nodes has two segments between the same nodes: its fibres stay explicit
+        if stations < 2 + usize::from(wrap.is_some()) {
+            continue;
+        }
+        for start in (0..lines).step_by(LANES) {
+            let count = (lines - start).min(LANES);
+            let group = Group {
+                first: (first + start * stations) as u32,
+                lines: count as u32,
+                stations: stations as u32,
+                closed: u32::from(wrap.is_some()),
+                shift: shift(wrap),
+            };
+            match groups.last_mut() {
+                Some(last)
+                    if lines == 1
+                        && last.lines < LANES as u32
+                        && (last.stations, last.closed, last.shift) == (group.stations, group.closed, group.shift)
+                        && last.first + last.lines * last.stations == group.first =>
+                {
+                    last.lines += 1;
+                }
+                _ => groups.push(group),
+            }
+        }
+    }
+    groups
+}
