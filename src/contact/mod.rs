@@ -3,10 +3,10 @@
 //! A scene has the kinds of pairs that it calls for, each with stages of its own, and friction only if something rubs.
 //!
 //! Yarns have a closed `surface` of `face`s. `grid` sorts slabs of faces and beams into cells, `candidates` lists the faces near each
-//! beam and each node of a yarn, and every step `penalty` adds the forces of the listed faces on the points that these carry,
-//! which `arc` lays along beams. `threads` does the same for pairs of beams: `arc_offset` lays their lines, and `segments` integrates
-//! along them. Forces and contact stiffness are added as integers, so
-//! their sum does not depend on the order, and the forces of a pair cancel exactly.
+//! beam and each node of a yarn, and every step `penalty` adds the forces of the listed faces, the gradient of a `potential`, on the
+//! points that these carry, which `arc` lays along beams. For beams on beams, `pairs` finds who is near, and `threads` adds the
+//! forces: `arc_offset` lays the lines of threads, and `segments` integrates along them. Forces and contact stiffness are added as
+//! integers, so their sum does not depend on the order, and the forces of a pair cancel exactly.
 
 pub mod arc;
 pub mod arc_offset;
@@ -14,7 +14,9 @@ pub mod candidates;
 pub mod face;
 pub mod friction;
 pub mod grid;
+pub mod pairs;
 pub mod penalty;
+pub mod potential;
 pub mod segments;
 pub mod skin;
 pub mod slip;

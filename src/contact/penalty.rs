@@ -1,20 +1,7 @@
 //! Penalty contact of points with the closed surfaces of yarns, every step: points along the beams of a thread, and the nodes of
 //! yarn surfaces.
 //!
-//! The force is the gradient of one energy. With b(d) = ½ k ⟨r − d⟩² of the distance d to a closed feature, ⟨·⟩ the positive
-//! part, a point of radius r has
-//!
-//! ```text
-//! Ψ = Σ_faces b − Σ_edges b + Σ_corners b  +  inside · [½ k (r + d)² − b(d)]
-//! ```
-//!
-//! The signed sum is ∫ −b′(ρ) χ(ρ) dρ with χ(ρ) the Euler characteristic of the surface within ρ of the point: 1 for a piece
-//! of it, 2 for two walls, however it is cut into faces. So a flat or convex surface pushes with b of its distance, both walls
-//! of a valley push, and the force is continuous across edges and corners (inclusion and exclusion, as in Li et al.,
-//! Convergent Incremental Potential Contact, 2023; its reading as an Euler characteristic is our own).
-//!
-//! A body is closed: a point is inside if it lies behind what of the surface is nearest, and what is nearest then pushes
-//! it out. On the surface both parts of the energy meet. The nodes of yarns have no radius, and of the energy ½ k d² is left.
+//! The elastic force is the gradient of the potential of [`super::potential`].
 //!
 //! What a pair loses is not of the energy: damping of the approach and friction act once for each point and body, along
 //! and across the resultant, against the mean motion of the faces that push, each by its force: a choice among the walls of a valley
@@ -23,8 +10,9 @@
 //! Every face of a point's list has a gap counter. It is looked at again once bodies can have closed the gap.
 
 use super::candidates::MADE;
-use super::face::{Closest, OnEdge, Patch, closest, on_corner, on_edge};
+use super::face::{Closest, Patch, closest};
 use super::friction::slide;
+use super::potential::{self, Nearest, Point, Push, Pushed, Seen, margin, out};
 use super::sums::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
 use super::surface::{self, CARRIED, Corners, POINT, Surface, of_coded};
 use super::{EMPTY, Params, add_force, add_stiffness, candidates, is_in_range, of_key, status, sums};
@@ -46,10 +34,6 @@ pub const LEAST: usize = 0;
 pub const CLOSED: usize = 1;
 pub const INNER: usize = 2;
 pub const GAPS: usize = 3;
-/// More than rounding moves a gap, mm: a face that touches by less than that must not be missed, whenever its gap was last known.
-const GAP_ROUNDING: f64 = 1e-6;
-/// Two places are equally near if their distances differ by no more than this share of them.
-const TIE: f64 = 1e-4;
 /// Numbers of a touch: normal force and its part from damping, N; with friction then the elastic tangential displacement, mm (3).
 pub const NORMAL: usize = 0;
 pub const DAMPED: usize = 1;
@@ -59,11 +43,8 @@ pub const fn touch(friction: bool) -> usize {
 }
 
 /// What the twin takes from Rust, of points of a `kind`.
-const fn shared(kind: usize, friction: bool) -> [Constant; 11] {
-    constants![
-        uint: LEAST, CLOSED, INNER, GAPS, NORMAL, DAMPED, ELASTIC, TOUCH = touch(friction), KIND = kind;
-        scalar: GAP_ROUNDING, TIE
-    ]
+const fn shared(kind: usize, friction: bool) -> [Constant; 9] {
+    constants![uint: LEAST, CLOSED, INNER, GAPS, NORMAL, DAMPED, ELASTIC, TOUCH = touch(friction), KIND = kind]
 }
 
 const SLOTS: [Slot; 16] = [
@@ -98,12 +79,6 @@ const fn kind(threads: bool) -> usize {
 #[inline(always)]
 fn viscosity<R: Real>(params: &Params, penalty: R, inverse: R) -> R {
     R::from_f64(f64::from(params.damping)) * R::from_f64(2.0) * (penalty / inverse).sqrt()
-}
-
-/// How much farther than what is nearest, at a `distance`, a face may be and still count as equally near, with room, mm.
-#[inline(always)]
-fn margin<R: Real>(distance: R) -> R {
-    R::from_f64(2.0 * TIE) * distance + R::from_f64(GAP_ROUNDING)
 }
 
 /// What stays of a point from step to step, and its sums.
@@ -142,218 +117,6 @@ struct Step<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> {
     flags: &'a [AtomicU32],
     /// Place of the kind of points in the status.
     kind: usize,
-}
-
-/// A point that may touch something.
-struct Point<R, const N: usize> {
-    nodes: [usize; N],
-    weights: [R; N],
-    /// From its first node, in the reference and now.
-    from: (Vector<R>, Vector<R>),
-    penalty: R,
-    full_radius: R,
-    radius: R,
-    /// Sum of the sizes of the weights.
-    size: R,
-}
-
-/// Where the surface of a body is nearest to a point: the entry of its face; unit vector from there; distance, and height above the
-/// face, mm.
-#[derive(Clone, Copy)]
-struct Nearest<R> {
-    found: bool,
-    entry: u32,
-    away: Vector<R>,
-    distance: R,
-    height: R,
-}
-
-/// Force, N, and energy, mJ, that push a point out that is inside and so far from the surface, mm.
-#[inline(always)]
-fn out<R: Real, const N: usize>(at: &Point<R, N>, depth: R) -> (R, R) {
-    let (whole, outside) = (at.radius + depth, (at.radius - depth).max(R::from_f64(0.0)));
-    (at.penalty * (whole + outside), R::from_f64(0.5) * at.penalty * (whole * whole - outside * outside))
-}
-
-/// How a face, with the edges and corners that it owns, pushes a point.
-#[derive(Clone, Copy)]
-struct Push<R> {
-    /// What acts on its corners, N.
-    pull: [Vector<R>; 4],
-    /// Energy, mJ, and sum of the forces along their own directions, N: what the energy gains for each mm of radius.
-    energy: R,
-    pressing: R,
-    /// Features that push.
-    count: R,
-}
-
-impl<R: Real> Push<R> {
-    #[inline(always)]
-    fn none() -> Self {
-        let zero = R::from_f64(0.0);
-        Self { pull: [[zero; 3]; 4], energy: zero, pressing: zero, count: zero }
-    }
-
-    /// Adds a `force` (N) on the point, `away` from a place by weights of the corners, and its `energy` (mJ).
-    #[inline(always)]
-    fn add(&mut self, weights: [R; 4], away: Vector<R>, force: R, energy: R) {
-        self.energy = self.energy + energy;
-        self.pressing = self.pressing + force;
-        for a in 0..4 {
-            self.pull[a] = fma(away, -(force * weights[a]), self.pull[a]);
-        }
-    }
-
-    /// Adds an edge or a corner within the radius, with its `sign` in the sum.
-    #[inline(always)]
-    fn add_border<const N: usize>(&mut self, at: &Point<R, N>, border: &OnEdge<R>, sign: f64) {
-        if border.square < at.radius * at.radius {
-            let distance = border.square.sqrt();
-            let depth = at.radius - distance;
-            let force = R::from_f64(sign) * (at.penalty * depth);
-            let away = scale(border.offset, R::from_f64(1.0) / distance.max(R::from_f64(1e-12)));
-            self.add(border.weights, away, force, R::from_f64(0.5) * force * depth);
-            self.count = self.count + R::from_f64(sign).max(R::from_f64(0.0));
-        }
-    }
-
-    /// The force on the point, N.
-    #[inline(always)]
-    fn total(&self) -> Vector<R> {
-        let [a, b, c, d] = self.pull;
-        scale(add(add(a, b), add(c, d)), R::from_f64(-1.0))
-    }
-
-    /// Of a face with edges and corners by its `marks`.
-    #[inline(always)]
-    fn of_face<const N: usize>(at: &Point<R, N>, q: &[Vector<R>; 4], marks: u32, point: &Closest<R>) -> Self {
-        let (mut push, depth) = (Self::none(), at.radius - point.distance);
-        if !(depth > R::from_f64(0.0)) {
-            return push;
-        }
-        let force = at.penalty * depth;
-        push.add(point.weights, point.away, force, R::from_f64(0.5) * force * depth);
-        push.count = R::from_f64(1.0);
-        for a in 0..4 {
-            if marks >> a & 1 == 1 {
-                push.add_border(at, &on_edge(q, a), -1.0);
-            }
-            if marks >> (4 + a) & 1 == 1 {
-                push.add_border(at, &on_corner(q, a), 1.0);
-            }
-        }
-        push
-    }
-}
-
-/// A face of a list that was looked at.
-#[derive(Clone, Copy)]
-struct Seen<R> {
-    entry: u32,
-    corners: Corners<R>,
-    point: Closest<R>,
-    push: Push<R>,
-}
-
-impl<R: Real> Seen<R> {
-    #[inline(always)]
-    fn none() -> Self {
-        let zero = R::from_f64(0.0);
-        let corners = Corners { nodes: [0; 4], reference: [[zero; 3]; 4], current: [[zero; 3]; 4] };
-        let (weights, away) = ([zero; 4], [zero; 3]);
-        let point = Closest { weights, away, distance: zero, height: zero, interior: false };
-        Self { entry: EMPTY, corners, point, push: Push::none() }
-    }
-}
-
-/// What a body does to a point.
-struct Pushed<R> {
-    nearest: Nearest<R>,
-    /// The last face that pushes or was nearest: mostly the only one, which need not be looked at again.
-    last: Seen<R>,
-    /// Whether the point is pushed out from behind the nearest face.
-    inside: bool,
-    /// Resultant of the elastic forces on the point, N, and their energy, mJ; see [`Push`].
-    push: Vector<R>,
-    energy: R,
-    pressing: R,
-    features: R,
-    /// Sum of the forces of faces, N.
-    shared: R,
-    /// Of places on the faces that push, times their forces, or of the nearest place if none does: velocity, mm/s, reference place from
-    /// the point, mm, and inverse mass, 1/tonne.
-    motion: Vector<R>,
-    apart: Vector<R>,
-    inverse: R,
-}
-
-impl<R: Real> Pushed<R> {
-    #[inline(always)]
-    fn none() -> Self {
-        let zero = R::from_f64(0.0);
-        let nearest = Nearest { found: false, entry: EMPTY, away: [zero; 3], distance: zero, height: zero };
-        let (push, motion, apart) = ([zero; 3], [zero; 3], [zero; 3]);
-        let (energy, pressing, features, shared, inverse) = (zero, zero, zero, zero, zero);
-        Self {
-            nearest,
-            last: Seen::none(),
-            inside: false,
-            push,
-            energy,
-            pressing,
-            features,
-            shared,
-            motion,
-            apart,
-            inverse,
-        }
-    }
-
-    /// Whether a place is nearer than what is known. Of faces whose common edge or corner is nearest, the one that is seen most
-    /// steeply tells on which side the point is.
-    #[inline(always)]
-    fn is_nearer(&self, point: &Closest<R>) -> bool {
-        let known = &self.nearest;
-        let tie = known.distance * R::from_f64(TIE) + R::from_f64(0.1 * GAP_ROUNDING);
-        let apart = point.distance - known.distance;
-        !known.found || apart < -tie || apart <= tie && point.height.abs() > known.height.abs()
-    }
-
-    /// Whether the point is behind the nearest place that is known, no deeper than what is pushed out, nor than `most` (mm), which it
-    /// can have come to since it was looked at: at a corner of a crumpled surface, a point in front may look as if it were behind.
-    #[inline(always)]
-    fn is_behind(&self, params: &Params, most: R) -> bool {
-        let Nearest { found, distance, height, .. } = self.nearest;
-        found && height < R::from_f64(0.0) && distance < most.min(R::from_f64(f64::from(params.depth)))
-    }
-
-    /// Distance from which on a face cannot change what is nearest, mm.
-    #[inline(always)]
-    fn beyond(&self) -> R {
-        self.nearest.distance * R::from_f64(1.0 - 2.0 * TIE) - R::from_f64(0.2 * GAP_ROUNDING)
-    }
-
-    /// Adds what pushes a point out that is inside; returns how deep it is, mm.
-    #[inline(always)]
-    fn push_out<const N: usize>(&mut self, at: &Point<R, N>) -> R {
-        let Nearest { away, distance, .. } = self.nearest;
-        let (force, energy) = out(at, distance);
-        self.inside = true;
-        self.push = fma(away, -force, self.push);
-        self.energy = self.energy + energy;
-        self.pressing = self.pressing + force;
-        self.features = self.features + R::from_f64(1.0);
-        distance
-    }
-
-    /// Adds what a face does.
-    #[inline(always)]
-    fn add(&mut self, push: &Push<R>) {
-        self.push = add(self.push, push.total());
-        self.energy = self.energy + push.energy;
-        self.pressing = self.pressing + push.pressing;
-        self.features = self.features + push.count;
-    }
 }
 
 /// What damping and friction do to a point, N, and a bound of all its stiffness against a body, N/mm.
@@ -693,6 +456,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
             &super::CONSTANTS,
             &surface::shared(THREAD),
             &candidates::CONSTANTS,
+            &potential::CONSTANTS,
             &sums::shared(FRICTION, PERIODIC),
             &shared(kind(THREAD), FRICTION),
         ],

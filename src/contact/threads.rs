@@ -1,34 +1,26 @@
-//! Contact of beams with beams: which are near, and every step the forces of those that touch, from the line of one thread integrated
-//! over that of the other (see [`super::segments`] and [`super::arc_offset`]), with damping and friction at the point where these act.
-//!
-//! A pair is two beams; the one with the lower number integrates over the other. The pairs of a beam with the beams of one thread that
-//! follow each other are a chain: each takes off the joint with the one before it if that one is in the chain too.
-//!
-//! Two points of a thread that bends to a circle of radius ρ lie 2ρ sin(a/2ρ) apart, with a the arc between them. No bend is tighter
-//! than ρ = r, where the inside folds, so points within an arc of π r, half a turn of the tightest loop, never touch: beams of one
-//! thread with nearer ends closer than that along it are no pair.
+//! Contact of beams with beams: every step the forces of the pairs that touch (see [`super::pairs`]), from the line of one thread
+//! integrated over that of the other (see [`super::segments`] and [`super::arc_offset`]), with damping and friction at the point where
+//! these act.
 //!
 //! A pair with a gap is left alone until the gap can have closed, as in [`super::penalty`]: points of lines move at most as fast as
 //! nodes times the sum of their weights.
 
-use super::arc_offset::{self, OffsetLines, Piece};
+use super::arc_offset::{self, Piece};
 use super::friction::slide;
-use super::grid::{self, BOX, MOTION, absolute, cell_index, cells, has_moved, inverse, pull_back};
+use super::pairs::{READS, Scene};
 use super::segments::{self, Push, Segments};
 use super::sums::{self, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
-use super::{
-    EMPTY, Params, add_force, add_stiffness, found, is_in_range, key, of_key, shift, slot_state, status, surface,
-};
+use super::{EMPTY, Params, add_force, add_stiffness, is_in_range, of_key, slot_state, status};
 use crate::elements::beam2::{self, TABLE};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Slot, constants, joined, slot};
 use crate::kernel::lane::{Lane, Real};
-use crate::kernel::node::{Displacements, Field, Lattice};
-use crate::kernel::position::{self, QUANTUM};
+use crate::kernel::node::Field;
+use crate::kernel::position;
 use crate::kernel::row::Row;
 use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};
-use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale, sub};
+use crate::kernel::vector::{add, apply, dot, fma, norm, scale, sub};
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
@@ -36,32 +28,6 @@ use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 pub const MOST_PAIRS: usize = 64;
 /// Share of a beam below which the length that touches is not divided by.
 const LEAST: f64 = 1e-6;
-
-/// What both kernels read of beams.
-const READS: [Slot; 7] = [
-    Slot::read("ends", Uint),
-    Slot::read("beams", Scalar),
-    Slot::read("reference", Int),
-    Slot::read("quanta", Int),
-    Slot::read("remainder", Scalar),
-    // see [`super::arc_offset`]
-    Slot::read("neighbours", Uint),
-    Slot::read("shares", Scalar),
-];
-
-/// The slots of [`Pairs`].
-const PAIRS: [Slot; 14] = joined(
-    &READS,
-    &[
-        Slot::read("counts", Uint),
-        Slot::read("lists", Uint),
-        Slot::read("boxes", Scalar),
-        Slot::row_of_plan("keys", Uint),
-        Slot::row_of_plan("states", Scalar),
-        Slot::row("found_when", Uint, 1),
-        Slot::atomic("status", Uint),
-    ],
-);
 
 /// The slots of [`Force`].
 const FORCE: [Slot; 15] = joined(
@@ -78,268 +44,8 @@ const FORCE: [Slot; 15] = joined(
     ],
 );
 
-/// Finds pairs of beams.
-pub struct Pairs<const PERIODIC: bool>;
 /// Contact forces of pairs of beams.
 pub struct Force<const FRICTION: bool, const PERIODIC: bool>;
-
-/// What both kernels read of beams.
-struct Scene<'a, R, const PERIODIC: bool> {
-    ends: &'a [u32],
-    beams: &'a [R],
-    offsets: OffsetLines<'a, R>,
-    reference: Lattice<'a>,
-    displacement: Displacements<'a, R>,
-    gradient: &'a [[R; 3]; 3],
-    period: [i32; 2],
-    self_arc: R,
-}
-
-impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
-    #[inline(always)]
-    fn new(io: &'a Io<R>, params: &Params) -> Self {
-        Self {
-            ends: io.uints(slot!(&READS, "ends")),
-            beams: io.scalars(slot!(&READS, "beams")),
-            offsets: OffsetLines {
-                neighbours: io.uints(slot!(&READS, "neighbours")),
-                shares: io.scalars(slot!(&READS, "shares")),
-            },
-            reference: Lattice::new(io, slot!(&READS, "reference")),
-            displacement: Displacements::new(io, slot!(&READS, "quanta"), slot!(&READS, "remainder")),
-            gradient: &io.row.gradient,
-            period: params.period,
-            self_arc: R::from_f64(f64::from(params.self_arc)),
-        }
-    }
-
-    /// The piece of the line of a beam.
-    #[inline(always)]
-    fn piece(&self, beam: usize) -> Piece<R> {
-        self.offsets.piece::<PERIODIC>(self.beams, self.ends, beam, &self.displacement, self.gradient)
-    }
-
-    /// The pieces of beam `a`, which is known, and of `b` in an image, in the reference and now.
-    #[inline(always)]
-    fn segments(&self, a: usize, own: &Piece<R>, b: usize, image: [i32; 2]) -> [Segments<R>; 2] {
-        let other = self.piece(b);
-        let (a, b) = (self.ends[2 * a] as usize, self.ends[2 * b] as usize);
-        let rest: Vector<R> = self.reference.between(b, a, shift::<PERIODIC>(self.period, image));
-        let affine = if PERIODIC { add(rest, apply(self.gradient, rest)) } else { rest };
-        let now = add(affine, self.displacement.between(b, a));
-        let between = |own: [Vector<R>; 2], apart, other: [Vector<R>; 2]| Segments {
-            along: sub(own[1], own[0]),
-            start: add(apart, sub(other[0], own[0])),
-            other: sub(other[1], other[0]),
-        };
-        [between(own.rest, rest, other.rest), between(own.now, now, other.now)]
-    }
-
-    /// Whether beam `a` takes the joint at the first end of `b` off: where it is a pair with the beam before `b` too.
-    #[inline(always)]
-    fn owns(&self, a: usize, b: usize, image: [i32; 2]) -> bool {
-        let before = self.offsets.before(b, image);
-        before.is_some_and(|(before, image)| before > a && !self.offsets.are_near(a, before, image, self.self_arc))
-    }
-}
-
-/// What tells a beam which others are near.
-struct Search<'a, R, const PERIODIC: bool> {
-    scene: Scene<'a, R, PERIODIC>,
-    params: Params,
-    counts: &'a [u32],
-    lists: &'a [u32],
-    boxes: &'a [R],
-    inverse: [[R; 2]; 2],
-    reach: R,
-}
-
-/// Cells from the first to the last along x and y.
-type Cells = [(i32, i32); 2];
-
-impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
-    /// The cells of a beam's piece; `None` if it is nowhere.
-    #[inline(always)]
-    fn cells(&self, io: &Io<R>, beam: usize, piece: &Piece<R>) -> Option<Cells> {
-        let (node, _) = absolute::<Pairs<PERIODIC>, _>(io, &self.inverse, self.scene.ends[2 * beam] as usize);
-        let ends = piece.now.map(|end| pull_back(&self.inverse, end));
-        let range = |k: usize| {
-            let (a, b) = (node[k] + ends[0][k], node[k] + ends[1][k]);
-            cells::<_, PERIODIC>(&self.params, k, a.min(b), a.max(b))
-        };
-        (node[0].is_finite() && node[1].is_finite()).then(|| [range(0), range(1)])
-    }
-
-    /// The items of a cell; more than it can hold if it is full.
-    #[inline(always)]
-    fn items(&self, x: i32, y: i32) -> Option<&[u32]> {
-        let cell = cell_index(&self.params, x, y);
-        let capacity = self.params.capacity as usize;
-        (self.counts[cell] <= self.params.capacity)
-            .then(|| &self.lists[cell * capacity..][..self.counts[cell] as usize])
-    }
-
-    /// Whether a beam of a higher number in these cells has moved relative to this one since everything was searched; `None` if a
-    /// cell is full.
-    #[inline(always)]
-    fn has_moved(&self, beam: usize, [xs, ys]: Cells) -> Option<bool> {
-        let item = self.params.slabs + beam as u32;
-        let own = &self.boxes[BOX * item as usize..][..BOX];
-        let (least, greatest) = ([0, 1, 2].map(|k| own[MOTION + k]), [0, 1, 2].map(|k| own[MOTION + 3 + k]));
-        let apart = R::from_i32(self.params.apart as i32);
-        let mut moved = false;
-        for y in ys.0..=ys.1 {
-            for x in xs.0..=xs.1 {
-                let near = self.items(x, y)?.iter().filter(|near| **near > item);
-                moved = moved
-                    || near
-                        .into_iter()
-                        .any(|near| has_moved(&self.boxes[BOX * *near as usize..][..BOX], least, greatest, apart));
-            }
-        }
-        Some(moved)
-    }
-
-    /// The image of an item that is nearest to a beam.
-    #[inline(always)]
-    fn image(&self, beam: usize, near: usize) -> [i32; 2] {
-        let item = self.params.slabs as usize + beam;
-        [0, 1].map(|k| {
-            if !PERIODIC || self.params.period[k] == 0 {
-                return 0;
-            }
-            let apart = self.boxes[BOX * item + k] - self.boxes[BOX * near + k];
-            (apart / (R::from_i32(self.params.period[k]) * R::from_f64(QUANTUM))).to_i32()
-        })
-    }
-
-    /// Whether a pair is within reach.
-    #[inline(always)]
-    fn is_near(&self, beam: usize, piece: &Piece<R>, other: usize, image: [i32; 2]) -> bool {
-        let [_, now] = self.scene.segments(beam, piece, other, image);
-        now.distance() < self.reach
-    }
-
-    /// Takes pairs that are out of reach off a beam's list; how many are left.
-    #[inline(always)]
-    fn keep(&self, beam: usize, piece: &Piece<R>, keys: &mut [u32], states: &mut [R]) -> usize {
-        let size = self.params.state as usize;
-        let mut count = 0;
-        for slot in 0..keys.len() {
-            let known = std::mem::replace(&mut keys[slot], EMPTY);
-            if known == EMPTY {
-                break;
-            }
-            let (other, image) = of_key(known);
-            if self.is_near(beam, piece, other, image) {
-                keys[count] = known;
-                states.copy_within(size * slot..size * (slot + 1), size * count);
-                count += 1;
-            }
-        }
-        count
-    }
-
-    /// Adds pairs within reach to a beam's list of `count`, in ascending order whatever that of the cells is; `false` if there is no room.
-    #[inline(always)]
-    fn fill(
-        &self,
-        beam: usize,
-        piece: &Piece<R>,
-        [xs, ys]: Cells,
-        keys: &mut [u32],
-        states: &mut [R],
-        mut count: usize,
-    ) -> bool {
-        let size = self.params.state as usize;
-        for y in ys.0..=ys.1 {
-            for x in xs.0..=xs.1 {
-                for &near in self.items(x, y).unwrap_or_default() {
-                    if near <= self.params.slabs + beam as u32 {
-                        continue;
-                    }
-                    let other = (near - self.params.slabs) as usize;
-                    let image = self.image(beam, near as usize);
-                    let key = key(other, image);
-                    let place = keys[..count].iter().take_while(|known| **known < key).count();
-                    let is_known = place < count && keys[place] == key;
-                    if is_known
-                        || self.scene.offsets.are_near(beam, other, image, self.scene.self_arc)
-                        || !self.is_near(beam, piece, other, image)
-                    {
-                        continue;
-                    }
-                    if count == keys.len() {
-                        return false;
-                    }
-                    keys.copy_within(place..count, place + 1);
-                    states.copy_within(size * place..size * count, size * (place + 1));
-                    keys[place] = key;
-                    states[size * place..][..size].fill(R::from_f64(0.0));
-                    count += 1;
-                }
-            }
-        }
-        true
-    }
-}
-
-impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
-    const SHADER: Shader = Shader {
-        defines: &[when(PERIODIC, "PERIODIC")],
-        constants: &[
-            &position::CONSTANTS,
-            &beam2::CONSTANTS,
-            &status::CONSTANTS,
-            &super::CONSTANTS,
-            &surface::shared(true),
-            &grid::CONSTANTS,
-            &arc_offset::CONSTANTS,
-            &segments::CONSTANTS,
-        ],
-        ..Shader::new("contact/threads", "pairs")
-    };
-    const SLOTS: &'static [Slot] = &PAIRS;
-
-    #[inline(always)]
-    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let params: Params = io.params();
-        let search = Search::<_, PERIODIC> {
-            scene: Scene::new(io, &params),
-            params,
-            counts: io.uints(slot!(&PAIRS, "counts")),
-            lists: io.uints(slot!(&PAIRS, "lists")),
-            boxes: io.scalars(slot!(&PAIRS, "boxes")),
-            inverse: inverse::<_, PERIODIC>(&io.row.gradient),
-            reach: L::Scalar::from_f64(f64::from(2.0 * params.thread_radius + params.skin)),
-        };
-        let mut keys = io.own::<u32>(slot!(&PAIRS, "keys"));
-        let mut states = io.own::<L::Scalar>(slot!(&PAIRS, "states"));
-        let mut when = io.own::<u32>(slot!(&PAIRS, "found_when"));
-        let flags = io.atomic_uints(slot!(&PAIRS, "status"));
-        for beam in items {
-            let piece = search.scene.piece(beam);
-            let Some(cells) = search.cells(io, beam, &piece) else {
-                flags[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
-                continue;
-            };
-            let when = when.at(0, beam);
-            // overflow keeps what was known, and is searched again with larger tables
-            let Some(moved) = search.has_moved(beam, cells) else { continue };
-            if !moved && *when == found::WITH_ALL {
-                continue;
-            }
-            let (keys, states) = (keys.item(0, beam), states.item(0, beam));
-            let count = search.keep(beam, &piece, keys, states);
-            if !search.fill(beam, &piece, cells, keys, states, count) {
-                flags[status::FLAGS].fetch_or(status::SLOTS_FULL, Ordering::Relaxed);
-                continue;
-            }
-            *when = if *when == found::NEVER { found::WITH_ALL } else { found::SINCE };
-            flags[status::SEARCHED].fetch_add(1, Ordering::Relaxed);
-        }
-    }
-}
 
 /// Two beams that touch: their nodes and weights, the penalty times their lengths, N/mm, and their pieces at rest.
 struct Pair<R> {
@@ -587,8 +293,6 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
             &beam2::CONSTANTS,
             &status::CONSTANTS,
             &super::CONSTANTS,
-            &surface::shared(true),
-            &grid::CONSTANTS,
             &arc_offset::CONSTANTS,
             &segments::CONSTANTS,
             &sums::shared(FRICTION, PERIODIC),

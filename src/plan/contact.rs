@@ -7,7 +7,7 @@ use super::surfaces::{Carried, Surfaces};
 use super::{Active, Capacity, ContactPoint, Tables};
 use crate::contact::found::NEVER;
 use crate::contact::skin::SKIN_APART;
-use crate::contact::{EMPTY, Params, candidates, grid, penalty, slot_state, sums, surface, threads, tie};
+use crate::contact::{EMPTY, Params, candidates, grid, pairs, penalty, slot_state, sums, surface, threads, tie};
 use crate::elements::beam2;
 use crate::error::Result;
 use crate::kernel::buffer::{Buffer, Initial, Kind};
@@ -297,7 +297,7 @@ impl ContactScene<'_> {
         let both = wires![reference, quanta, remainder, keys: (keys, slots), states: (state, size * slots), status];
         let both = [&both[..], &self.lines(offsets)].concat();
         let wires = [&both[..], &search.wires(), &wires![found_when: found]].concat();
-        let kernel = flagged!(threads::Pairs; periodic);
+        let kernel = flagged!(pairs::Pairs; periodic);
         b.plan.search.push(Stage::new("thread-thread candidates", kernel, (beams, 32), &wires, params));
         let Added { force, stiffness } = total;
         let forces = wires![velocity, mass, sums: (sums, each), forces: force, stiffness];

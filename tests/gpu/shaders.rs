@@ -99,7 +99,8 @@ macro_rules! fields {
 fn parameters(file: &str) -> Vec<Field<&'static str>> {
     match file {
         "elements/hex8" | "elements/hex8_reduced" => fields!(elements::block::Params: nodes, left),
-        "contact/grid" | "contact/candidates" | "contact/penalty" | "contact/threads" | "contact/tie" => fields!(
+        "contact/grid" | "contact/candidates" | "contact/penalty" | "contact/pairs" | "contact/threads"
+        | "contact/tie" => fields!(
             contact::Params: period, cells, capacity, faces, slots, beam_slots, slabs, state, origin, cell, skin, friction, tangential, damping,
             force_quantum, stiffness_quantum, thread_radius, thread_thread, self_arc, depth, apart
         ),
