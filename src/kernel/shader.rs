@@ -241,7 +241,7 @@ mod tests {
     fn an_error_names_the_file_and_line_of_the_source() {
         let mut text = Text::of(&stage(Exact::SHADER)).unwrap();
         assert!(text.module().is_ok());
-        let (file, number) = ("kernel/position", 4);
+        let (file, number) = ("kernel/position", 2);
         let at = text.lines.iter().position(|l| *l == (file, number)).unwrap();
         let mut lines: Vec<&str> = text.text.lines().collect();
         for (wrong, why) in [("let x = ;", "expected"), ("fn wrong() -> f32 { return 1u; }", "return")] {
@@ -249,7 +249,7 @@ mod tests {
             let broken = Text { text: lines.join("\n"), lines: std::mem::take(&mut text.lines) };
             let message = broken.module().unwrap_err().to_string();
             println!("{message}");
-            assert!(message.starts_with("shaders/kernel/position.wgsl:4: "), "{message}");
+            assert!(message.starts_with("shaders/kernel/position.wgsl:2: "), "{message}");
             assert!(message.to_lowercase().contains(why), "{message}");
             text.lines = broken.lines;
         }
