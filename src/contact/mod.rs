@@ -14,6 +14,7 @@ pub mod candidates;
 pub mod face;
 pub mod friction;
 pub mod grid;
+pub mod memory;
 pub mod pairs;
 pub mod penalty;
 pub mod potential;

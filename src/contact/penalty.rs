@@ -12,6 +12,7 @@
 use super::candidates::MADE;
 use super::face::{Closest, Patch, closest};
 use super::friction::slide;
+use super::memory::{CLOSED, DAMPED, ELASTIC, GAPS, INNER, Kept, LEAST, NORMAL, touch};
 use super::potential::{self, Nearest, Point, Push, Pushed, Seen, margin, out};
 use super::sums::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
 use super::surface::{self, CARRIED, Corners, POINT, Surface, of_coded};
@@ -27,20 +28,6 @@ use crate::kernel::stage::{Io, Kernel, raise};
 use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
-
-/// Numbers before the gaps of a point, mm: the least gap when faces were last looked at; what bodies can have closed of it
-/// since; how deep the point was inside a body, or may have been. Then the gap of every face of the list.
-pub const LEAST: usize = 0;
-pub const CLOSED: usize = 1;
-pub const INNER: usize = 2;
-pub const GAPS: usize = 3;
-/// Numbers of a touch: normal force and its part from damping, N; with friction then the elastic tangential displacement, mm (3).
-pub const NORMAL: usize = 0;
-pub const DAMPED: usize = 1;
-pub const ELASTIC: usize = 2;
-pub const fn touch(friction: bool) -> usize {
-    if friction { ELASTIC + 3 } else { ELASTIC }
-}
 
 /// What the twin takes from Rust, of points of a `kind`.
 const fn shared(kind: usize, friction: bool) -> [Constant; 9] {
@@ -79,28 +66,6 @@ const fn kind(threads: bool) -> usize {
 #[inline(always)]
 fn viscosity<R: Real>(params: &Params, penalty: R, inverse: R) -> R {
     R::from_f64(f64::from(params.damping)) * R::from_f64(2.0) * (penalty / inverse).sqrt()
-}
-
-/// What stays of a point from step to step, and its sums.
-struct Kept<'a, R> {
-    gaps: &'a mut [R],
-    keys: &'a mut [u32],
-    touches: &'a mut [R],
-    sums: &'a mut [R],
-}
-
-impl<R: Real> Kept<'_, R> {
-    /// With a new list all faces are looked at. How deep the point was inside stays known; before the first one it may be anywhere up
-    /// to `depth` (mm).
-    #[inline(always)]
-    fn renew(&mut self, made: u32, depth: R) {
-        if self.keys[0] != made {
-            let inner = if self.keys[0] == EMPTY { depth } else { self.gaps[INNER] };
-            self.keys[0] = made;
-            self.gaps.fill(R::from_f64(0.0));
-            self.gaps[INNER] = inner;
-        }
-    }
 }
 
 /// What one step reads and adds to.

@@ -69,6 +69,9 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
     const WORKS: Works = Works { damping: DAMPING, inertia: LINES || MASS_ADDED, gravity: GRAVITY };
 }
 
+/// Nodes that are integrated together, so that the loops over each axis fill registers.
+const BLOCK: usize = 64;
+
 /// Factors on the old velocity and on the acceleration.
 #[inline(always)]
 pub fn factors<R: Real, const DAMPING: bool>(damping: R, dt: R) -> (R, R) {
@@ -130,51 +133,59 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
         let mut kept =
             (works.count() > 0).then(|| io.own::<L::Scalar>(slot!(Self::SLOTS, "work", Self::WORKS.count() > 0)));
         let row = io.row;
-        let solid = factors::<_, DAMPING>(row.damping_solid, row.dt_mid);
-        let thread = factors::<_, DAMPING>(row.damping_thread, row.dt_mid);
         let (zero, half) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(0.5));
-        for node in items {
-            let is_solid = node < params.first_thread as usize;
-            let (keep, gain) = if is_solid { solid } else { thread };
-            let damping = if is_solid { row.damping_solid } else { row.damping_thread };
-            let mass = if works.count() > 0 { masses[node] } else { zero };
-            // what acts beyond the mass of the node
-            let added = MASS_ADDED && inverse[node] != zero;
-            let extra = if added { L::Scalar::from_f64(1.0) / inverse[node] - mass } else { zero };
-            let (mut damped, mut inertia, mut fallen) = (zero, zero, zero);
-            for k in 0..3 {
-                let mut a = acceleration[node + k * plane];
-                let mut virtual_force = zero;
-                if LINES {
-                    let c = correction[node + k * plane];
-                    a = a + c;
-                    virtual_force = (mass + extra) * c;
-                }
+        let border = params.first_thread as usize;
+        let solids = items.start..items.end.min(border);
+        let threads = items.start.max(border)..items.end;
+        for (nodes, damping) in [(solids, row.damping_solid), (threads, row.damping_thread)] {
+            let (keep, gain) = factors::<_, DAMPING>(damping, row.dt_mid);
+            for first in nodes.clone().step_by(BLOCK) {
+                let count = BLOCK.min(nodes.end - first);
+                let mass = if works.count() > 0 { &masses[first..][..count] } else { &[] };
+                let heavy = if GRAVITY { &true_masses[first..][..count] } else { &[] };
+                // what acts beyond the mass of each node, and works, summed over the axes
+                let [mut extra, mut damped, mut inertia, mut fallen] = [[zero; BLOCK]; 4];
                 if MASS_ADDED {
-                    virtual_force = virtual_force - extra * a;
+                    for ((extra, inverse), mass) in extra.iter_mut().zip(&inverse[first..][..count]).zip(mass) {
+                        *extra = if *inverse == zero { zero } else { L::Scalar::from_f64(1.0) / *inverse - *mass };
+                    }
                 }
-                let v = velocity.at(k, node);
-                let new = if DAMPING { *v * keep + a * gain } else { *v + a * gain };
-                let mean = half * (*v + new);
-                *v = new;
-                if DAMPING {
-                    damped = damped + mass * damping * mean * mean * row.dt_mid;
-                }
-                if LINES || MASS_ADDED {
-                    inertia = inertia + virtual_force * mean * row.dt_mid;
-                }
-                if GRAVITY {
+                for k in 0..3 {
+                    let a = &acceleration[first + k * plane..][..count];
+                    let correction = if LINES { &correction[first + k * plane..][..count] } else { &[] };
                     let gravity = L::Scalar::from_f64(f64::from(params.gravity[k]));
-                    fallen = fallen + true_masses[node] * gravity * mean * row.dt_mid;
+                    let (v, q) = (velocity.slice(k, first, count), quanta.slice(k, first, count));
+                    let r = remainder.slice(k, first, count);
+                    for i in 0..count {
+                        let mut a = a[i];
+                        let mut virtual_force = zero;
+                        if LINES {
+                            a = a + correction[i];
+                            virtual_force = (mass[i] + extra[i]) * correction[i];
+                        }
+                        if MASS_ADDED {
+                            virtual_force = virtual_force - extra[i] * a;
+                        }
+                        let new = if DAMPING { v[i] * keep + a * gain } else { v[i] + a * gain };
+                        let mean = half * (v[i] + new);
+                        v[i] = new;
+                        if DAMPING {
+                            damped[i] = damped[i] + mass[i] * damping * mean * mean * row.dt_mid;
+                        }
+                        if LINES || MASS_ADDED {
+                            inertia[i] = inertia[i] + virtual_force * mean * row.dt_mid;
+                        }
+                        if GRAVITY {
+                            fallen[i] = fallen[i] + heavy[i] * gravity * mean * row.dt_mid;
+                        }
+                        (q[i], r[i]) = carry(q[i], r[i] + new * row.dt);
+                    }
                 }
-                let (q, r) = (quanta.at(k, node), remainder.at(k, node));
-                (*q, *r) = carry(*q, *r + new * row.dt);
-            }
-            if let Some(kept) = &mut kept {
-                for (plane, done) in [(damped_plane, damped), (inertia_plane, inertia), (fallen_plane, fallen)] {
-                    if let Some(plane) = plane {
-                        let work = kept.at(plane, node);
-                        *work = *work + done;
+                let works = [(damped_plane, damped), (inertia_plane, inertia), (fallen_plane, fallen)];
+                for (plane, done) in works {
+                    if let (Some(kept), Some(plane)) = (&mut kept, plane) {
+                        let kept = kept.slice(plane, first, count);
+                        kept.iter_mut().zip(&done).for_each(|(kept, done)| *kept = *kept + *done);
                     }
                 }
             }

@@ -1,6 +1,6 @@
 //! The interface of a kernel: the buffers that it binds and the constants that it shares with its WGSL twin, each declared once.
 //!
-//! A kernel lists [`Slot`]s. Its Rust function finds the number of a slot by name when it is compiled ([`slot!`]), the text of the
+//! A kernel lists [`Slot`]s. Its Rust function finds the number of a slot by name when it is compiled (`slot!`), the text of the
 //! twin gets its bindings from the same list, and the plan binds buffers by the same names. A slot that belongs to an effect is
 //! there only [`Slot::when`] the kernel has the flag of that effect; all numbers behind it follow.
 

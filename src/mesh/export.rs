@@ -237,8 +237,8 @@ fn solid_section(
 
 /// Engineering constants at rest of the law of Charmetant et al.: E₁, E₂, E₃, ν₁₂, ν₁₃, ν₂₃, G₁₂, G₁₃, G₂₃.
 ///
-/// With small strains ε its invariants are I_elong = ε₁₁, I_comp = (ε₂₂ + ε₃₃)/2, I_sh² = γ₁₂² + γ₁₃² and I_dist² = ((ε₂₂ − ε₃₃)²
-/// + γ₂₃²)/4. Each energy is half a stiffness times its square; for compaction that stiffness is K p c^(p−2) below the cap c.
+/// With small strains ε its invariants are I_elong = ε₁₁, I_comp = (ε₂₂ + ε₃₃)/2, I_sh² = γ₁₂² + γ₁₃² and
+/// I_dist² = ((ε₂₂ − ε₃₃)² + γ₂₃²)/4. Each energy is half a stiffness times its square; for compaction that stiffness is K p c^(p−2) below the cap c.
 /// Hence C₂₂ = (K_comp' + K_dist)/4 and C₂₃ = (K_comp' − K_dist)/4. Without a cap the stiffness at rest is zero or infinite; a
 /// cap of 0.001 is then used.
 fn at_rest(&[elongation, compaction, exponent, distortion, shear, cap]: &[f64; 6]) -> [f64; 9] {

@@ -7,7 +7,9 @@ use super::surfaces::{Carried, Surfaces};
 use super::{Active, Capacity, ContactPoint, Tables};
 use crate::contact::found::NEVER;
 use crate::contact::skin::SKIN_APART;
-use crate::contact::{EMPTY, Params, candidates, grid, pairs, penalty, slot_state, sums, surface, threads, tie};
+use crate::contact::{
+    EMPTY, Params, candidates, grid, memory, pairs, penalty, slot_state, sums, surface, threads, tie,
+};
 use crate::elements::beam2;
 use crate::error::Result;
 use crate::kernel::buffer::{Buffer, Initial, Kind};
@@ -25,7 +27,7 @@ pub struct FaceBuffers {
     /// List of near faces of each carrier, see [`crate::contact::surface::entry`], and gap counters of each point.
     pub near: Buffer,
     pub gaps: Buffer,
-    /// Bodies that each point touches, and [`penalty::touch`] of each.
+    /// Bodies that each point touches, and [`memory::touch`] of each.
     pub keys: Buffer,
     pub touches: Buffer,
     /// See [`crate::contact::found`].
@@ -243,8 +245,8 @@ impl ContactScene<'_> {
         let carriers = b.indices(names.carriers, carried.carriers.clone());
         let nodes = b.indices(names.nodes, carried.nodes.clone());
         let points = b.table(names.points, carried.points.clone());
-        let (list, row) = (candidates::MADE + faces, penalty::GAPS + faces);
-        let (places, size) = (candidates::MADE + slots, penalty::touch(friction));
+        let (list, row) = (candidates::MADE + faces, memory::GAPS + faces);
+        let (places, size) = (candidates::MADE + slots, memory::touch(friction));
         let each = sums::sums(friction, periodic);
         let empty = |len: usize| Initial::Uint(vec![EMPTY; len]);
         let near = b.add(names.near, Kind::Uint, list * lists, true, empty(list * lists));

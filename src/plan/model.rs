@@ -3,7 +3,7 @@
 use super::contact::FaceBuffers;
 use super::totals::Totals;
 use super::{Active, Parts};
-use crate::contact::{penalty, slot_state};
+use crate::contact::{memory, slot_state};
 use crate::elements::LANES;
 use crate::kernel::buffer::Buffer;
 use crate::kernel::stage::{Plan, Stage};
@@ -140,7 +140,7 @@ impl Model {
             whole_mass: nodes.whole_mass(),
             first_thread: nodes.first_thread,
             hex_at,
-            touch: penalty::touch(tables.active.friction),
+            touch: memory::touch(tables.active.friction),
             slot_state: slot_state(tables.active.friction),
             limits,
             true_mass: p.nodes.true_masses,

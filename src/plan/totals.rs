@@ -60,7 +60,7 @@ pub struct Totals {
     pub reaction: Option<Sums>,
     /// Of hexahedra, beams and bends: nine components each.
     pub stress: Vec<Sums>,
-    /// Of points and pairs of beams: columns as in [`penalty`].
+    /// Of points and pairs of beams: columns as in [`crate::contact::sums`].
     pub contact: Vec<Sums>,
     /// Elastic energy of ties.
     pub ties: Option<Sums>,

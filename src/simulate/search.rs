@@ -1,7 +1,7 @@
 //! The contact search on the host: everywhere or where bodies have moved, with tables that grow when they overflow.
 
 use super::Simulation;
-use crate::contact::penalty::GAPS;
+use crate::contact::memory::GAPS;
 use crate::contact::threads::MOST_PAIRS;
 use crate::contact::{found, status};
 use crate::error::Result;

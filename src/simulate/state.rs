@@ -1,7 +1,7 @@
 //! The state of a scene on the host: positions, velocities, forces, fields for pictures, and its hash.
 
 use super::Simulation;
-use crate::contact::{EMPTY, candidates, penalty};
+use crate::contact::{EMPTY, candidates, memory};
 use crate::elements::LANES;
 use crate::kernel::buffer::Buffer;
 use crate::kernel::position::{QUANTUM, quanta};
@@ -157,7 +157,7 @@ impl Simulation {
             for (item, point) in self.model.points[kind].iter().enumerate() {
                 let keys = &keys[item * (candidates::MADE + slots)..][candidates::MADE..][..slots];
                 let slots = (0..slots).filter(|slot| keys[*slot] != EMPTY).map(|slot| item * slots + slot);
-                let normal: f64 = slots.map(|slot| touches[slot * self.model.touch + penalty::NORMAL]).sum();
+                let normal: f64 = slots.map(|slot| touches[slot * self.model.touch + memory::NORMAL]).sum();
                 for (node, share) in point.nodes.into_iter().zip(point.shares) {
                     force[node] += share * normal;
                     slip[node] += share * point.measure * slipped.as_ref().map_or(0.0, |slipped| slipped[item]);

@@ -4,5 +4,6 @@
 mod common;
 
 mod cell;
+mod scenes;
 mod shaders;
 mod stages;

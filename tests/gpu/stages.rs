@@ -2,10 +2,8 @@
 //! scalars are compared relative to their column. Without an adapter the tests say so and pass, unless TRICOT_REQUIRE_ADAPTER is
 //! set.
 
-use crate::common::{
-    Random, advance, bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, reduced, with,
-};
-use serde_json::{Value, json};
+use super::scenes::free;
+use crate::common::{Random, advance, coarse_cell, held_specimen, loaded, reduced};
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock, OnceLock};
 use tricot::backend::Backend;
@@ -35,39 +33,6 @@ fn device() -> Option<Arc<Device>> {
         Err(error) => panic!("{error}"),
     };
     DEVICE.get_or_init(open).clone()
-}
-
-/// Two blocks of different laws that touch, one held and one guided at an end, with a loose thread, gravity and open fibre lines.
-fn free() -> Value {
-    let held = json!({ "within": [[-0.1, -0.1, -0.1], [0.1, 1.1, 1.1]], "displacement_mm": [0.01, 0, 0] });
-    let guided = json!({
-        "body": "yarn", "within": [[2.9, -0.1, 0.9], [3.1, 1.1, 1.6]], "components": [true, false, false],
-        "displacement_mm": [0, 0, 0]
-    });
-    let thread = json!({
-        "name": "thread", "nodes": [[0, 0.5, 1.6], [1, 0.5, 1.6], [2, 0.7, 1.6], [3, 0.5, 1.6]], "radius_mm": 0.1,
-        "axial_n": 100, "bending_n_mm2": 0.01, "linear_density_tex": 10, "rest_curvature": 0.5
-    });
-    with(
-        bare(),
-        &[
-            (
-                "/domain/mesh/blocks",
-                json!([
-                    block("rubber", [19, 2, 1], [[0.0; 3], [3.0, 1.0, 1.0]], 1e-9, neo_hookean(1.0, 0.3)),
-                    block("yarn", [5, 2, 1], [[0.0, 0.0, 0.999], [3.0, 1.0, 1.501]], 1e-9, charmetant()),
-                ]),
-            ),
-            ("/domain/mesh/threads", json!([thread])),
-            ("/domain/mesh/conditions", json!([held, guided])),
-            ("/effects/gravity_mm_s2", json!([0, 0, -9810])),
-            ("/effects/fibre_lines", json!({})),
-            ("/effects/contact", json!({})),
-            ("/steps", json!([{ "move": { "time_s": 1e-4 } }])),
-            // bodies start pressed together
-            ("/integration", json!({ "energy_tolerance": 100 })),
-        ],
-    )
 }
 
 /// Allowed difference between the GPU and the CPU in f32, over the largest number of a column.

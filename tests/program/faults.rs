@@ -8,7 +8,7 @@ use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
-use tricot::contact::{EMPTY, penalty};
+use tricot::contact::{EMPTY, memory};
 use tricot::error::Error;
 use tricot::kernel::buffer::Kind;
 use tricot::kernel::interface::Slot;
@@ -84,7 +84,7 @@ fn contact_force(state: &mut Checkpoint) {
     let keys: Vec<u32> =
         state.buffers[at].chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
     let used = |slot: usize| keys[slot] != EMPTY;
-    f32s(state, "touches of thread points", |i, f| if used(i / penalty::touch(true)) { f32::NAN } else { f });
+    f32s(state, "touches of thread points", |i, f| if used(i / memory::touch(true)) { f32::NAN } else { f });
 }
 
 fn lost_position(state: &mut Checkpoint) {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use tricot::rigs::read::read;
 
-const LONGEST_FILE: usize = 900;
+const LONGEST_FILE: usize = 500;
 
 /// Every Rust file below a folder.
 fn sources(folder: &str) -> Vec<PathBuf> {
