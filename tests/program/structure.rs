@@ -151,6 +151,9 @@ fn the_readme_speaks_of_what_is_there() {
             read(Path::new(case), &sets).unwrap();
         }
     }
+    let example = text(Path::new("examples/cell.rs"));
+    let (_, body) = example.split_once("\nfn main()").expect("the example has a main function");
+    assert!(readme.contains(&format!("fn main(){body}")), "the README shows examples/cell.rs as it is");
     for link in readme.split("](").skip(1).map(|l| l.split(')').next().unwrap()) {
         let remote = link.starts_with("http") || link.starts_with('#');
         assert!(remote || link.ends_with(".png") || Path::new(link).exists(), "the README links to {link}");
