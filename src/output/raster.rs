@@ -339,9 +339,9 @@ struct Heights {
     values: Vec<f32>,
     width: usize,
     margin: usize,
-    /// For each way that a pixel can be turned: in every direction, how far away, mm, and how far in `values`.
+    /// For each rotation of the pattern: distance, mm, and offset in `values`, in every direction.
     around: [[[(f32, isize); RINGS.len()]; DIRECTIONS]; TURNS],
-    /// For each way: along the ray to the key light, by how much it rises, mm, and how far in `values`.
+    /// For each rotation: rise, mm, and offset in `values`, along the ray to the key light.
     towards: [[(f32, isize); STEPS]; TURNS],
 }
 
