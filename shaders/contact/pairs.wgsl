@@ -84,7 +84,7 @@ fn is_near(beam: u32, line: Piece, other: u32, image: vec2<i32>) -> bool {
     return distance_of(pieces(beam, line, other, image).now) < 2.0 * params.thread_radius + params.skin;
 }
 
-// Copies a slot with all its data to another slot.
+// Moves a slot with all its data to another slot.
 fn move_slot(slot: u32, to: u32) {
     keys[to] = keys[slot];
     for (var i = 0u; i < bound(params.state, arrayLength(&states)); i++) {

@@ -165,7 +165,7 @@ pub fn has_moved<R: Real>(bounds: &[R], low: [R; 3], high: [R; 3], apart: R) -> 
     beyond(0) || beyond(1) || beyond(2)
 }
 
-/// Least and greatest motion of some nodes, quanta.
+/// Bounds of the motion of some nodes, quanta.
 pub struct Moved {
     least: [i32; 3],
     greatest: [i32; 3],

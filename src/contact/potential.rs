@@ -72,7 +72,7 @@ pub fn out<R: Real, const N: usize>(at: &Point<R, N>, depth: R) -> (R, R) {
 pub struct Push<R> {
     /// Forces on its corners, N.
     pub pull: [Vector<R>; 4],
-    /// Energy, mJ, and sum of the forces along their own directions, N: what the energy gains for each mm of radius.
+    /// Energy, mJ, and sum of the force magnitudes, N: the derivative of the energy by the radius.
     pub energy: R,
     pub pressing: R,
     /// Number of pushing features.

@@ -6,7 +6,6 @@
 //! as long as nothing within reach has moved by more than [`SKIN_APART`] relative to its carrier. Bodies that move with their
 //! surroundings, as in the clamp of a specimen, are not searched. A carrier searched since then is searched at every check,
 //! until there are enough of them for a full search to pay.
-//! every look, until enough are for a search of everything to pay.
 //!
 //! A pair in no list was farther apart than reach plus skin when the list was made. It has come closer by at most `SKIN_APART`
 //! until the last check, by as much again through the affine motion of a periodic cell, and by 2 × `SKIN_USED` since. The rest

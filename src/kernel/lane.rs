@@ -24,7 +24,7 @@ pub trait Lane:
     type Scalar: Real;
     /// Result of a comparison, lane by lane.
     type Mask: Copy;
-    /// Numbers in a register.
+    /// Lanes per register.
     const WIDTH: usize;
 
     /// The same number in every lane.

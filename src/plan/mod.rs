@@ -47,8 +47,8 @@ pub use totals::{Largest, Sums, Totals};
 
 /// The plan of a scene.
 ///
+/// # Errors
 /// Geometry that cannot be run: inverted elements, contradictory motions.
-/// Geometry that cannot be run: inverted elements, motions that contradict each other.
 pub fn build(scene: &Scene, capacity: Capacity) -> Result<Model> {
     let tables = Tables::new(scene)?;
     let (t, b) = (&tables, &mut Builder::default());

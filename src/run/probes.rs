@@ -48,8 +48,8 @@ impl Probes {
 
 /// Nodes of each probe.
 ///
+/// # Errors
 /// Names a probe that lies outside the mesh.
-/// Names a probe that is nowhere in the mesh.
 pub(super) fn nodes(probes: &[Probe], mesh: &Mesh) -> Result<Vec<Vec<usize>>> {
     let thread = |name: &str| {
         let found = mesh.threads.iter().find(|thread| thread.name == name);
