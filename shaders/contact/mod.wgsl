@@ -7,7 +7,7 @@ fn is_finite(x: f32) -> bool {
 }
 
 #if STATUS
-// Raises a shared maximum of non-negative numbers, kept as the bits of an f32.
+// Raises a shared maximum of non-negative numbers, stored as the bits of an f32.
 fn raise(place: u32, value: f32) {
     let bits = bitcast<u32>(value);
     if bits > atomicLoad(&status[place]) {

@@ -101,7 +101,7 @@ fn row_sum(node: u32) -> f32 {
 }
 
 #if weighed_limit
-// The mean of R/m around each node.
+// The weighted mean of R/m over each node and its neighbours.
 fn weighed_limit(node: u32) {
     // fully prescribed nodes are excluded
     if weight(node) > 0.0 {

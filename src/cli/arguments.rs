@@ -48,10 +48,10 @@ pub enum Command {
         /// Results folder [default: results/<name of the case>]
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
-        /// Scalar type, instead of what the case says
+        /// Scalar type, overriding the case
         #[arg(long)]
         precision: Option<Scalar>,
-        /// Number of threads [default: all cores]; results do not depend on it
+        /// Number of threads [default: all cores]; it does not affect the results
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
         threads: Option<u16>,
         /// Machine that runs the scene; auto takes a discrete GPU if there is one
@@ -105,7 +105,7 @@ pub enum Command {
         /// Folder of a run
         #[arg(value_name = "DIR")]
         source: PathBuf,
-        /// The page [default: report.html in the folder]
+        /// Output file [default: report.html in the folder]
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
     },
@@ -196,7 +196,7 @@ pub enum StudyCommand {
         /// Turn off only this effect, by its name in `tricot check CASE`; may be repeated
         #[arg(long, value_name = "EFFECT")]
         only: Vec<String>,
-        /// Scalar type, instead of what the case says
+        /// Scalar type, overriding the case
         #[arg(long)]
         precision: Option<Scalar>,
         /// Number of threads [default: all cores]
@@ -243,7 +243,7 @@ impl CaseArguments {
     }
 }
 
-/// Two numbers with a comma between them.
+/// Two numbers separated by a comma.
 fn ends(text: &str) -> std::result::Result<[f64; 2], String> {
     let numbers = text.split(',').map(|number| number.trim().parse().ok()).collect::<Option<Vec<f64>>>();
     numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| "give two numbers, as 0,0.4".into())

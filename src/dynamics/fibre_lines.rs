@@ -35,7 +35,7 @@ pub struct Group {
     pub lines: u32,
     /// Nodes per line.
     pub stations: u32,
-    /// 1 if the last node is followed by the first.
+    /// 1 if the first node follows the last, else 0.
     pub closed: u32,
     /// Image shift of the first node when it follows the last, in quanta along x and y.
     pub shift: [i32; 2],
@@ -96,7 +96,7 @@ impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let groups: &[Group] = bytemuck::cast_slice(io.uints(slot!(&SLOTS, "groups")));
-        // taken out rather than borrowed in a closure, which would not be compiled for the instruction set
+        // taken, not borrowed in a closure, because the closure would not be compiled for the instruction set
         let mut memory = SCRATCH.take();
         for group in items {
             let group = groups[group];

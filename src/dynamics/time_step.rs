@@ -194,7 +194,7 @@ impl<R: Real> Weights<'_, R> {
 pub struct ElementLimit<const BENDING: bool, const MASS_ADDED: bool>;
 /// Excludes fully prescribed nodes, which do not vibrate.
 pub struct HeldLimit;
-/// The mean of R/m around each node, 1/s².
+/// The weighted mean of R/m over each node and its neighbours, 1/s².
 pub struct WeighedLimit<const BENDING: bool>;
 
 impl<const BENDING: bool, const MASS_ADDED: bool> Kernel for ElementLimit<BENDING, MASS_ADDED> {

@@ -10,7 +10,7 @@
 //! F_m dd/dγ = F_s L · 2 sin(45° − γ/2) cos(45° − γ/2) = F_s L sin(90° − γ) = F_s L cos γ,
 //!
 //! and since Eq. 17 defines F_nor = F_s L / l², with A₀ = l² the reference area, dW/dγ = F_nor A₀ cos γ. A homogenised
-//! cell under the same kinematics has dW/dγ = V P̄ : dF̄/dγ, with P̄ the mean first Piola stress, hence
+//! cell under the same kinematics has dW/dγ = V P̄ : dF̄/dγ, with P̄ the mean first Piola–Kirchhoff stress, hence
 //!
 //! F_nor = (V P̄ : dF̄/dγ) / (A₀ cos γ).
 

@@ -153,7 +153,7 @@ impl Checkpoint {
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// All checkpoints in a folder of results, oldest first.
+/// All checkpoints in a results folder, oldest first.
 fn list(results: &Path) -> Result<Vec<PathBuf>> {
     let folder = results.join(FOLDER);
     let fail = |e: std::io::Error| Error::file(&folder, reason(&e));

@@ -16,7 +16,7 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// Reads a CSV file that [`Table`](super::table::Table) or [`Named`](super::table::Named) wrote.
+    /// Reads a CSV file written by [`Table`](super::table::Table) or [`Named`](super::table::Named).
     pub fn read(path: &Path) -> Result<Self> {
         let failed = |e: csv::Error| Error::file(path, e.to_string());
         let text = fs::read_to_string(path).map_err(|e| Error::file(path, reason(&e)))?;
@@ -45,7 +45,7 @@ impl Columns {
         self.header.iter().collect()
     }
 
-    /// The rows as a type whose fields are among the columns.
+    /// The rows as values of a type whose fields are among the columns.
     ///
     /// # Errors
     /// A column that is missing, or a cell that does not fit the type of its field.

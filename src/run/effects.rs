@@ -184,7 +184,7 @@ impl Found<'_> {
         }
     }
 
-    /// What the case describes, and what every scene has.
+    /// Effects that follow from the domain of the case, and effects of every scene.
     fn scene(&mut self) {
         if self.simulation.model.active.periodic {
             self.add("periodicity", "domain.cell".into(), &["total kinetic energy"], None);

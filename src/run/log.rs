@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-/// Name of the file in a folder of results.
+/// Name of the log file in a results folder.
 pub const NAME: &str = "run.log";
 
 /// The log of a run.
