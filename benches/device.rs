@@ -1,5 +1,5 @@
-//! What a step costs on a GPU: microseconds a step, hexahedra a second, the time of each stage by the device's own clock, the
-//! share of the step between dispatches, and how far the step is from what the device can do at best. One scene a run:
+//! Cost of a step on a GPU: microseconds per step, hexahedra per second, the time of each stage by the device's own clock, the
+//! share of the step spent between dispatches, and the distance from the performance limits of the device. One scene per run:
 //! `cargo bench --bench device -- WARPS WEFTS` (2 4: the 10 × 10 mm cell; 6 12: 30 × 30 mm; 20 40: 100 × 100 mm).
 
 use naga::{Expression, MathFunction, Statement, TypeInner};
@@ -13,10 +13,10 @@ use tricot::rigs::read::read;
 use tricot::run::simulation;
 use tricot::simulate::{BackendConfig, Simulation};
 
-/// A quick pre-tension, so that contact is as busy as in most of a run, and where timing starts, s.
+/// A quick pretension, so that contact is as busy as in most of a run, and the start of timing, s.
 const QUICK: [&str; 2] = ["steps.0.pretension.time_s=1e-4", "steps.1.stretch.time_s=5e-5"];
 const START: f64 = 1.6e-4;
-/// Steps that are timed.
+/// Number of timed steps.
 const STEPS: u64 = 1024;
 
 fn main() {
@@ -58,7 +58,7 @@ fn main() {
         sum += spent;
         let stages = plan.step.iter().filter(|s| s.name() == name && !s.items().is_empty());
         let floor = stages.map(|s| floor(&sheet, s, rates.bytes, rates.operations)).fold(0.0, |a, b| a + b);
-        // only the stages of every step have one
+        // only the stages of every step have a lower bound
         let floor = (floor > 0.0).then(|| format!("{:12.2} {:10.0} %", 1e6 * floor, 100.0 * floor / spent));
         println!("{name:20} {:12.2} {}", 1e6 * spent, floor.unwrap_or_default());
     }
@@ -69,7 +69,7 @@ fn go(sheet: &mut Simulation, until: f64) {
     sheet.advance(until, |_| false).unwrap_or_else(|e| panic!("{e}"));
 }
 
-/// The least time of a stage, s: all its buffers moved once, or its operations at the best rate, whichever takes longer.
+/// Lower bound of the time of a stage, s: all its buffers moved once, or its operations at the peak rate, whichever takes longer.
 fn floor(sheet: &Simulation, stage: &Stage, bytes_per_s: f64, operations_per_s: f64) -> f64 {
     let buffers: HashSet<usize> =
         stage.reads().iter().chain(stage.writes().iter().map(|(b, _)| b)).map(|b| b.number()).collect();
@@ -80,7 +80,7 @@ fn floor(sheet: &Simulation, stage: &Stage, bytes_per_s: f64, operations_per_s: 
     (bytes as f64 / bytes_per_s).max(operations / operations_per_s)
 }
 
-/// Operations on f32 that one invocation of a stage does, if its shader has no loops; else 0: loops end by data.
+/// Number of f32 operations per invocation of a stage, if its shader has no loops; else 0, since loop counts depend on data.
 fn operations(stage: &Stage) -> f64 {
     let text = Text::of(stage).unwrap_or_else(|e| panic!("{e}"));
     let (module, info) = text.module().unwrap_or_else(|e| panic!("{e}"));
@@ -118,7 +118,7 @@ fn count(
     Some(sum)
 }
 
-/// Operations of the functions that a statement calls; `None` for loops.
+/// Number of operations of the functions called by a statement; `None` for loops.
 fn called(module: &naga::Module, statement: &Statement, all: &naga::valid::ModuleInfo) -> Option<f64> {
     let block = |block: &naga::Block| block.iter().map(|s| called(module, s, all)).sum::<Option<f64>>();
     match statement {

@@ -1,8 +1,8 @@
-//! What each stage of the default cell costs early in shear at its usual rate, after a quick pre-tension, on one thread.
+//! Cost of each stage of the default cell early in shear at its usual rate, after a quick pretension, on one thread.
 //!
-//! Criterion times every stage of a step alone, then search and diagnosis as a whole. The lines at the end come from real
-//! steps: how long each stage takes there, which share contact has, and how fast hexahedra with their assembly run
-//! compared with the hexahedron kernel alone ("bare"), repeated over blocks of consecutive nodes that fit the L2 cache.
+//! Criterion times every stage of a step alone, then search and diagnosis as a whole. The closing lines come from real steps:
+//! the time of each stage, the share of contact, and the rate of hexahedra with assembly compared with the hexahedron kernel
+//! alone ("bare"), repeated over blocks of consecutive nodes that fit the L2 cache.
 
 use criterion::Criterion;
 use std::hint::black_box;
@@ -17,11 +17,11 @@ use tricot::rigs::read::read;
 use tricot::run::simulation;
 use tricot::simulate::{BackendConfig, Simulation};
 
-/// Tightens the stitch soon, so that contact is as busy as in most of a run.
+/// A quick pretension, so that contact is as busy as in most of a run.
 const QUICK: [&str; 2] = ["steps.0.pretension.time_s=3e-4", "steps.1.stretch.time_s=1e-4"];
-/// A little way into shear, s: where timing starts.
+/// Start of timing, shortly after the start of shear, s.
 const START: f64 = 4.5e-4;
-/// Steps that are timed.
+/// Number of timed steps.
 const STEPS: u64 = 512;
 /// Blocks of the bare kernel: about 3 kB each.
 const BARE_BLOCKS: usize = 32;
@@ -53,7 +53,7 @@ fn main() {
     report(&mut cell, bare);
 }
 
-/// Goes on by about so many steps; returns how many they were.
+/// Advances by about `steps` steps; returns the actual number.
 fn advance(cell: &mut Simulation, steps: u64) -> u64 {
     let before = cell.step();
     while cell.step() < before + steps {
@@ -91,7 +91,7 @@ fn bench(
     });
 }
 
-/// Hexahedra per second of the kernel alone, the best of some repetitions.
+/// Hexahedra per second of the kernel alone, the best of several repetitions.
 fn bare(cell: &Simulation, config: &BackendConfig, row: Row<f64>) -> f64 {
     const ROUNDS: usize = 200;
     let model = &cell.model;
@@ -112,7 +112,7 @@ fn bare(cell: &Simulation, config: &BackendConfig, row: Row<f64>) -> f64 {
     (ROUNDS * count * LANES) as f64 / best.fold(f64::INFINITY, f64::min)
 }
 
-/// Times of the stages in real steps, in plain text.
+/// Times of the stages in real steps, as plain text.
 fn report(cell: &mut Simulation, bare: f64) {
     let times = |cell: &Simulation| cell.backend().timings();
     let before = times(cell);

@@ -1,5 +1,5 @@
-//! What a whole step of the default cell costs early in shear at its usual rate, after a quick pre-tension, on one
-//! thread and on all cores. Searches, energies and guards are in it, as in a run.
+//! Cost of a whole step of the default cell early in shear at its usual rate, after a quick pretension, on one thread and on
+//! all cores. Searches, energies and guards are included, as in a run.
 
 use criterion::{Criterion, SamplingMode};
 use std::path::Path;
@@ -8,11 +8,11 @@ use tricot::rigs::read::read;
 use tricot::run::simulation;
 use tricot::simulate::BackendConfig;
 
-/// Tightens the stitch soon, so that contact is as busy as in most of a run.
+/// A quick pretension, so that contact is as busy as in most of a run.
 const QUICK: [&str; 2] = ["steps.0.pretension.time_s=3e-4", "steps.1.stretch.time_s=1e-4"];
-/// A little way into shear, s: where timing starts.
+/// Start of timing, shortly after the start of shear, s.
 const START: f64 = 4.5e-4;
-/// Steps of one iteration: those between two looks at energies and limits.
+/// Steps per iteration: the interval between two evaluations of energies and limits.
 const STEPS: u64 = 64;
 
 fn main() {

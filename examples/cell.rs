@@ -1,4 +1,4 @@
-//! A cell of the shipped fabric without a file on disk: tightened, driven at a corner, sheared to 10°, and its shear force.
+//! A cell of the shipped fabric, built without a case file: pretensioned, driven at a corner, sheared to 10°, with its shear force.
 
 use serde_json::{Value, json};
 use tricot::prelude::*;

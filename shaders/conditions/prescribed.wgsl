@@ -11,7 +11,7 @@ struct Params {
 
 @group(2) @binding(1) var<uniform> params: Params;
 
-// Replaces accelerations of prescribed components, before fibre lines see them.
+// Replaces the accelerations of prescribed components before the fibre lines use them.
 fn prescribed(item: u32) {
     let node = nodes[2u * item];
     let mask = nodes[2u * item + 1u];
@@ -33,7 +33,7 @@ fn prescribed(item: u32) {
         let a = (aim - v * keep_gain.x) / keep_gain.y;
         acceleration[place] = a;
         let mean = (v + aim) * 0.5;
-        // a node that is held altogether carries no added mass
+        // a fully prescribed node carries no added mass
         var inertia = mass[node];
         if mask != 7u {
             inertia = 1.0 / inverse_mass[node];
@@ -49,7 +49,7 @@ fn prescribed(item: u32) {
 #endif
 
 #if hold
-// Takes back what fibre lines did to prescribed components.
+// Undoes the change of prescribed components by the fibre lines.
 fn hold(item: u32) {
     let plane = arrayLength(&correction) / 3u;
     for (var k = 0u; k < 3u; k++) {

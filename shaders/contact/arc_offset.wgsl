@@ -1,10 +1,11 @@
-// Where a thread is in contact with other threads: a line through its nodes, moved out to the mean of the arcs that its beams stand for.
-// What includes this binds `neighbours` and `shares`, and what `elements/beam2` asks for.
+// The contact line of a thread against other threads: a line through its nodes, offset to the mean of the arcs that its beams
+// represent.
+// The including file binds `neighbours` and `shares`, and the buffers that `elements/beam2` requires.
 
 #include "contact/mod"
 #include "elements/beam2"
 
-// A piece of the line: from the first node of its beam to both its ends, in the reference and now, mm.
+// A piece of the line: vectors from the first node of its beam to both its ends, in the reference and current states, mm.
 struct Piece {
     rest: array<vec3<f32>, 2>,
     now: array<vec3<f32>, 2>,
@@ -32,7 +33,8 @@ fn piece(beam: u32) -> Piece {
     return Piece(rest, array<vec3<f32>, 2>(rest[0] + change[0], rest[1] + change[1]));
 }
 
-// Whether two beams are the same thread here and closer along it than `arc` after so many turns of a closed thread.
+// Whether two beams belong to the same thread here, with a distance along it below `arc`, after a number of turns of a closed
+// thread.
 fn are_near_after(turns: i32, a: u32, b: u32, image: vec2<i32>, arc: f32) -> bool {
     let wrap = vec2<i32>(i32(neighbours[NEIGHBOURS * a + 3u]), i32(neighbours[NEIGHBOURS * a + 4u]));
     let p = SHARES * a + ARC;
@@ -41,7 +43,7 @@ fn are_near_after(turns: i32, a: u32, b: u32, image: vec2<i32>, arc: f32) -> boo
     return all(wrap * turns == image) && abs(shares[q] - shares[p] + f32(turns) * shares[p + 2u]) < reach;
 }
 
-// Whether two beams, the second in an image, are the same thread here, and closer along it than `arc` from end to end.
+// Whether two beams, the second in an image, belong to the same thread here, with a distance along it below `arc` from end to end.
 fn are_near(a: u32, b: u32, image: vec2<i32>, arc: f32) -> bool {
     let is_same = neighbours[NEIGHBOURS * a + 2u] == neighbours[NEIGHBOURS * b + 2u];
     return is_same
@@ -49,7 +51,7 @@ fn are_near(a: u32, b: u32, image: vec2<i32>, arc: f32) -> bool {
 }
 
 #if PAIRS
-// The four nodes on which a piece hangs.
+// The four nodes that carry a piece.
 fn nodes_of(beam: u32) -> vec4<u32> {
     let first = ends[2u * neighbours[NEIGHBOURS * beam]];
     let last = ends[2u * neighbours[NEIGHBOURS * beam + 1u] + 1u];
@@ -65,14 +67,14 @@ fn weights_of(beam: u32) -> array<vec4<f32>, 2> {
     );
 }
 
-// The largest sum of the sizes of these weights.
+// The largest sum of the absolute values of these weights.
 fn most_weights(beam: u32) -> f32 {
     let share = shares_of(beam);
     let largest = max(share.x + share.y, share.z + share.w);
     return 1.0 + largest + largest;
 }
 
-// The beam before another one in an image, and its image; itself at the start of a thread.
+// The beam before another beam in an image, and its image; itself at the start of a thread.
 fn before_of(beam: u32, image: vec2<i32>) -> Keyed {
     let at = NEIGHBOURS * beam;
     let before = neighbours[at];

@@ -1,4 +1,5 @@
-// The faces near what carries contact points: every face of another body whose box lies within reach of the box of the points.
+// Broad-phase candidates: for each carrier of contact points, the faces of other bodies whose box lies within reach of the box
+// of its points.
 
 #define STATUS
 #define FACES
@@ -8,7 +9,7 @@
 #include "contact/grid"
 
 #if ROOT
-// Where the points of a carrier are, see the twin.
+// The extent of the points of a carrier, see the twin.
 struct Place {
     low: vec3<f32>,
     high: vec3<f32>,
@@ -41,7 +42,7 @@ fn place_of(carrier: u32, base: u32, back: Inverse) -> Place {
     );
 }
 
-// The image of a slab within reach, if any.
+// The image of a slab whose box is within reach, if any.
 struct Within {
     yes: bool,
     image: vec2<i32>,
@@ -69,7 +70,7 @@ fn image_within(place: Place, slab: u32, reach: f32, stretched: vec2<f32>) -> Wi
     return Within(!any(abs(apart) > room), image);
 }
 
-// Whether the box of a face, whose corners are seen from the same node, is within reach.
+// Whether the box of a face, with corners relative to the same node, is within reach.
 fn is_near(place: Place, q: array<vec3<f32>, 4>, reach: f32) -> bool {
     let low = min(min(q[0], q[1]), min(q[2], q[3]));
     let high = max(max(q[0], q[1]), max(q[2], q[3]));
@@ -77,10 +78,11 @@ fn is_near(place: Place, q: array<vec3<f32>, 4>, reach: f32) -> bool {
     return dot(gap, gap) <= reach * reach;
 }
 
-// Adds an entry that is not yet there to a list of `count`, which starts at `first`; returns how many there are, or would be.
+// Adds an entry, if it is new, to a list of `count` that starts at `first`; returns the required number of entries, even
+// without room.
 fn add_entry(first: u32, count: u32, entry: u32) -> u32 {
     let body = body_of(entry);
-    // the first that does not come before it
+    // the first entry that is not smaller
     var low = 0u;
     var high = count;
     while low < high {
@@ -105,7 +107,7 @@ fn add_entry(first: u32, count: u32, entry: u32) -> u32 {
     return count + 1u;
 }
 
-// Bodies in a list.
+// Number of bodies in a list.
 fn bodies_in(first: u32, count: u32) -> u32 {
     var bodies = 0u;
     var last = EMPTY;
@@ -117,7 +119,7 @@ fn bodies_in(first: u32, count: u32) -> u32 {
     return bodies;
 }
 
-// Whether a slab is one of faces of another body, and near; its image.
+// Whether a slab belongs to another body and is within reach; its image.
 fn sees(slab: u32, own: u32, place: Place, reach: f32, stretched: vec2<f32>) -> Within {
     if slab >= params.slabs || marks(slabs[SLAB * slab]) >> 10u == own {
         return Within(false, vec2<i32>(0));
@@ -125,7 +127,7 @@ fn sees(slab: u32, own: u32, place: Place, reach: f32, stretched: vec2<f32>) -> 
     return image_within(place, slab, reach, stretched);
 }
 
-// Whether anything in reach has moved relative to the carrier since everything was searched.
+// Whether anything within reach has moved relative to the carrier since the last full search.
 fn searches(carrier: u32, place: Place, xs: vec2<i32>, ys: vec2<i32>, reach: f32, stretched: vec2<f32>) -> bool {
     let first = carriers[CARRIER * carrier];
     let own = carriers[CARRIER * carrier + 2u];
@@ -152,7 +154,7 @@ fn searches(carrier: u32, place: Place, xs: vec2<i32>, ys: vec2<i32>, reach: f32
     return false;
 }
 
-// Lists what is near; returns how many faces.
+// Lists the faces within reach; returns their number.
 fn list_faces(carrier: u32, base: u32, place: Place, xs: vec2<i32>, ys: vec2<i32>, reach: f32, stretched: vec2<f32>) -> u32 {
     let own = carriers[CARRIER * carrier + 2u];
     let nowhere = Offset(vec3<f32>(0.0), vec3<f32>(0.0));
@@ -195,7 +197,7 @@ fn candidates(item: u32) {
     }
     let xs = cells(0u, place.middle.x - place.half.x, place.middle.x + place.half.x);
     let ys = cells(1u, place.middle.y - place.half.y, place.middle.y + place.half.y);
-    // overflow is searched again with larger tables
+    // an overflow triggers a new search with larger tables
     for (var y = ys.x; y <= ys.y; y++) {
         for (var x = xs.x; x <= xs.y; x++) {
             if counts[cell_index(x, y)] > params.capacity {

@@ -1,8 +1,8 @@
-// A face of a yarn's surface, seen from a point that may touch it: a bilinear quadrilateral, its edges and its corners.
+// A face of a yarn's surface, seen from a contact point: a bilinear quadrilateral, its edges and its corners.
 
 #include "kernel/vector"
 
-// Middle and derivatives of a bilinear face.
+// Centre and derivatives of a bilinear face.
 struct Patch {
     middle: vec3<f32>,
     along: vec3<f32>,
@@ -18,7 +18,7 @@ fn patch_of(q: array<vec3<f32>, 4>) -> Patch {
     return Patch((s01 + s23) * 0.25, (d01 + d32) * 0.25, (s23 - s01) * 0.25, (d32 - d01) * 0.25);
 }
 
-// No point of the face is nearer to the origin than this, mm; negative if some may be anywhere.
+// Lower bound of the distance of the face from the origin, mm; negative if there is no bound.
 fn nearest(p: Patch) -> f32 {
     let a = p.along + p.across;
     let b = p.along - p.across;
@@ -29,7 +29,7 @@ fn at(p: Patch, xi: f32, eta: f32) -> vec3<f32> {
     return p.twist * (xi * eta) + (p.across * eta + (p.along * xi + p.middle));
 }
 
-// Coordinates of the point of the unbounded patch that is closest to the origin, see the twin.
+// Closest-point projection of the origin onto the unbounded patch, see the twin.
 fn project(p: Patch) -> vec2<f32> {
     var xi = 0.0;
     var eta = 0.0;
@@ -94,7 +94,7 @@ fn on_corner(q: array<vec3<f32>, 4>, a: u32) -> OnEdge {
     return OnEdge(weights, offset, dot(offset, offset));
 }
 
-// The closest point of a face: where the origin projects into it, else on the nearest of its edges.
+// The closest point of a face: the projection of the origin if it lies inside, else the closest point of the nearest edge.
 fn closest(q: array<vec3<f32>, 4>, p: Patch) -> Closest {
     let on = project(p);
     if abs(on.x) <= 1.0 && abs(on.y) <= 1.0 {

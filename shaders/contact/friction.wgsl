@@ -2,14 +2,14 @@
 
 #include "kernel/vector"
 
-// What one step of sliding leaves.
+// Result of one friction step.
 struct Slide {
     elastic: vec3<f32>,
     slip: f32,
     dissipated: f32,
 }
 
-// Part of a vector in the plane of a unit normal.
+// Tangential part of a vector for a unit normal.
 fn flat_part(normal: vec3<f32>, a: vec3<f32>) -> vec3<f32> {
     return normal * -dot(normal, a) + a;
 }
@@ -27,7 +27,7 @@ fn slide(elastic: vec3<f32>, motion: vec3<f32>, normal: vec3<f32>, tangential: f
         new_elastic = trial * (limit / held);
     }
     let gone = trial - new_elastic;
-    // work over the step with the mean of the force before and after, less what is stored
+    // work over the step with the mean of the old and new forces, minus the stored energy
     let lost = (dot(elastic, elastic) - dot(turned, turned)) + dot(turned + new_elastic, gone);
     return Slide(new_elastic, norm(gone), half_stiffness * lost);
 }

@@ -1,4 +1,4 @@
-// The grid of the contact search: slabs of faces and beams, each in every cell that its box touches.
+// The grid of the broad phase: slabs of faces and beams, each in every cell that its box touches.
 
 #if clear
 #if ROOT
@@ -44,12 +44,12 @@ fn pull_back(back: Inverse, v: vec3<f32>) -> vec2<f32> {
     return vec2<f32>(dot(back.x, v.xy), dot(back.y, v.xy));
 }
 
-// How far a distance in space reaches along the axes of the pulled-back plane.
+// Factor by which a distance in space can grow in the pulled-back plane, along its axes.
 fn stretch(back: Inverse) -> vec2<f32> {
     return vec2<f32>(sqrt(dot(back.x, back.x)), sqrt(dot(back.y, back.y)));
 }
 
-// Where a node is: pulled-back plane and height, mm. For the grid only; contact works with differences.
+// Node position: pulled-back plane and height, mm. For the grid only; contact uses position differences.
 fn absolute(back: Inverse, node: u32) -> vec3<f32> {
     let plane = arrayLength(&remainder) / 3u;
     let y = node + plane;
@@ -60,7 +60,7 @@ fn absolute(back: Inverse, node: u32) -> vec3<f32> {
     return at_rest + vec3<f32>(pull_back(back, w), w.z);
 }
 
-// First and last cell along one axis for an interval of the pulled-back plane; the last may lie behind the first by whole periods.
+// First and last cell along one axis for an interval of the pulled-back plane; the last may exceed the first by whole periods.
 fn cells(axis: u32, low: f32, high: f32) -> vec2<i32> {
     let x = (vec2<f32>(low, high) - params.origin[axis]) / params.cell[axis];
     let cell = vec2<i32>(floor(clamp(x, vec2<f32>(-1e6), vec2<f32>(1e6))));
@@ -73,14 +73,14 @@ fn cells(axis: u32, low: f32, high: f32) -> vec2<i32> {
     return clamp(cell, vec2<i32>(0), vec2<i32>(last));
 }
 
-// Number of a cell.
+// Index of a cell.
 fn cell_index(x: i32, y: i32) -> u32 {
     let n = vec2<i32>(params.cells);
     return u32(rem_euclid(y, n.y) * n.x + rem_euclid(x, n.x));
 }
 
 #if BEFORE
-// Displacement of a node since everything was searched, quanta; what includes this binds `before`, that of then.
+// Displacement of a node since the last full search, quanta; the including file binds the displacement at that search as `before`.
 fn motion(node: u32) -> vec3<i32> {
     let plane = arrayLength(&remainder) / 3u;
     let y = node + plane;
@@ -92,13 +92,13 @@ fn motion(node: u32) -> vec3<i32> {
 #endif
 
 #if BOXES
-// Motion of an item.
+// Bounds of the motion of an item.
 struct Motion {
     least: vec3<f32>,
     greatest: vec3<f32>,
 }
 
-// That of a box; what includes this binds `boxes`.
+// Motion stored in a box; the including file binds `boxes`.
 fn motion_of(item: u32) -> Motion {
     let at = BOX * item + MOTION;
     return Motion(
@@ -107,7 +107,8 @@ fn motion_of(item: u32) -> Motion {
     );
 }
 
-// Whether an item, by its box, has moved by more than `apart` relative to something else, or either by more than is told of.
+// Whether an item, by its box, has moved by more than `apart` relative to another, or whether either motion exceeds the range
+// of a box.
 fn has_moved(item: u32, other: Motion, apart: f32) -> bool {
     let own = motion_of(item);
     let most = vec3<f32>(f32(MOST_MOTION));
@@ -117,7 +118,7 @@ fn has_moved(item: u32, other: Motion, apart: f32) -> bool {
 #endif
 
 #if ROOT
-// The box of an item, from its first node, and the motion of its nodes.
+// The box of an item, relative to its first node, and the motion of its nodes.
 struct Bounds {
     low: vec3<f32>,
     high: vec3<f32>,

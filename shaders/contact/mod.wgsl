@@ -1,13 +1,13 @@
-// What all contact stages share: parameters, places and flags of the status buffer, keys of candidates, integer sums of forces.
-// With STATUS `status` is bound, with PAIRS also `forces` and `stiffness`; PARAMS asks for the parameters.
+// Common to all contact stages: parameters, places and flags of the status buffer, keys of candidates, integer sums of forces.
+// STATUS requires the binding `status`, PAIRS also `forces` and `stiffness`; PARAMS requires the parameters.
 
-// Whether a number is neither infinite nor not a number; by its bits, since compilers may assume that it is.
+// Whether a number is finite; tested by its bits, since compilers may assume that every number is.
 fn is_finite(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
 }
 
 #if STATUS
-// Raises a shared maximum of non-negative numbers, kept as the bits of an f32.
+// Raises a shared maximum of non-negative numbers, stored as the bits of an f32.
 fn raise(place: u32, value: f32) {
     let bits = bitcast<u32>(value);
     if bits > atomicLoad(&status[place]) {
@@ -44,19 +44,19 @@ struct Params {
 
 @group(2) @binding(1) var<uniform> params: Params;
 
-// How often a loop runs, of at most `most`, the length of what it runs over. Mesa's software device would take a bound that follows
-// from uniforms alone for a constant, unroll the loop, and compile the shader again for every dispatch.
+// Bound of a loop of at most `most` rounds, the length of the array it runs over. Mesa's software device would treat a bound
+// that depends only on uniforms as a constant, unroll the loop, and recompile the shader for every dispatch.
 fn bound(count: u32, most: u32) -> u32 {
     return min(count, most);
 }
 
-// What a key stands for.
+// The decoded key.
 struct Keyed {
     body: u32,
     image: vec2<i32>,
 }
 
-// Key of a candidate: what is touched, and in which lateral image, −8 to 7 periods along x and y.
+// Key of a candidate: the touched body or beam and its lateral image, −8 to 7 periods along x and y.
 fn key(body: u32, image: vec2<i32>) -> u32 {
     return body << 8u | (u32(image.x + 8) & 15u) << 4u | (u32(image.y + 8) & 15u);
 }

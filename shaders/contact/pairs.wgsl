@@ -1,4 +1,4 @@
-// Which beams are near each other: the pairs of a beam, found by the grid, and the pieces of lines that a pair is.
+// Pairs of nearby beams: found by the grid, each with the line pieces of its beams.
 
 #define STATUS
 #if pairs
@@ -8,7 +8,7 @@
 #include "contact/arc_offset"
 #include "contact/segments"
 
-// Two pieces in the reference and now.
+// Two pieces in the reference and current states.
 struct Pieces {
     rest: Segments,
     now: Segments,
@@ -18,7 +18,7 @@ fn segments_of(own: array<vec3<f32>, 2>, apart: vec3<f32>, other: array<vec3<f32
     return Segments(own[1] - own[0], apart + (other[0] - own[0]), other[1] - other[0]);
 }
 
-// The pieces of beam `a`, which is known, and of `b` in an image.
+// The pieces of the known beam `a` and of `b` in an image.
 fn pieces(a: u32, own: Piece, b: u32, image: vec2<i32>) -> Pieces {
     let apart = from_node(Imaged(ends[2u * b], image), ends[2u * a]);
     let other = piece(b);
@@ -41,7 +41,7 @@ fn cells_of(node: vec2<f32>, line: Piece, back: Inverse) -> Cells {
     return Cells(cells(0u, low.x, high.x), cells(1u, low.y, high.y));
 }
 
-// Whether a cell is full, and whether a beam of a higher number has moved relative to this one since everything was searched.
+// Whether a cell is full, and whether a beam of a higher number has moved relative to this one since the last full search.
 struct Moved {
     full: bool,
     moved: bool,
@@ -63,7 +63,7 @@ fn moved_in(item: u32, at: Cells) -> Moved {
     return found;
 }
 
-// The image of an item that is nearest to another one.
+// The image of an item nearest to another.
 fn image_of(item: u32, near: u32) -> vec2<i32> {
     var image = vec2<i32>(0);
 #if PERIODIC
@@ -84,7 +84,7 @@ fn is_near(beam: u32, line: Piece, other: u32, image: vec2<i32>) -> bool {
     return distance_of(pieces(beam, line, other, image).now) < 2.0 * params.thread_radius + params.skin;
 }
 
-// Moves a slot, of all that there are, to another one.
+// Moves a slot with all its data to another slot.
 fn move_slot(slot: u32, to: u32) {
     keys[to] = keys[slot];
     for (var i = 0u; i < bound(params.state, arrayLength(&states)); i++) {
@@ -92,7 +92,7 @@ fn move_slot(slot: u32, to: u32) {
     }
 }
 
-// Takes pairs that are out of reach off a beam's list; how many are left.
+// Removes pairs out of reach from a beam's list; returns the number left.
 fn keep(beam: u32, line: Piece) -> u32 {
     let slots = params.beam_slots;
     let first = slots * beam;
@@ -114,8 +114,8 @@ fn keep(beam: u32, line: Piece) -> u32 {
     return count;
 }
 
-// Adds a pair to a beam's list of `count` in ascending order, if it is not there and within reach; how many it then has, one more
-// than there is room for if there is none.
+// Inserts a pair within reach into a beam's list of `count`, in ascending order, if it is new; returns the new count, which
+// exceeds the capacity by one if there is no room.
 fn insert(beam: u32, line: Piece, near: u32, count: u32) -> u32 {
     let slots = params.beam_slots;
     let first = slots * beam;
@@ -155,7 +155,7 @@ fn pairs(beam: u32) {
     let at = cells_of(node, line, back);
     let found_at = found_when[beam];
     let moved = moved_in(params.slabs + beam, at);
-    // overflow keeps what was known, and is searched again with larger tables
+    // an overflow keeps the known pairs and triggers a new search with larger tables
     if moved.full || !moved.moved && found_at == WITH_ALL {
         return;
     }

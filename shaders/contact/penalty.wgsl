@@ -1,5 +1,5 @@
-// Penalty contact of points with the closed surfaces of yarns, every step: points along the beams of a thread with THREAD, else the
-// nodes of yarn surfaces.
+// Penalty contact of points with the closed surfaces of yarns, every step: points along the beams of a thread with THREAD, else
+// the nodes of yarn surfaces.
 
 #define STATUS
 #define PAIRS
@@ -14,16 +14,16 @@
 #endif
 
 #if ROOT
-// What damping and friction do to a point, N, and a bound of all its stiffness against a body, N/mm.
+// Damping and friction force on a point, N, and an upper bound of its total stiffness against a body, N/mm.
 struct Rubbed {
     force: vec3<f32>,
     rows: f32,
 }
 
-// What acts on a point, in quanta.
+// Force on a point, in quanta.
 var<private> own: vec3<i32>;
 
-// Adds forces to the corners of a face, and their opposite to what acts on the point, as integers whose sum is zero.
+// Adds forces to the corners of a face and their opposite to the force on the point, as integers whose sum is zero.
 fn pull(item: u32, around: Corners, pulled: array<vec3<f32>, 4>) {
     var pulls = pulled;
     var places = around.reference;
@@ -59,13 +59,13 @@ fn corners_of(here: Point, entry: u32) -> Corners {
     return corners(face.body, face.image, here.base, here.aside);
 }
 
-// Looks at a face closely.
+// Evaluates a face closely.
 fn see(here: Point, entry: u32, around: Corners, shape: Patch) -> Seen {
     let point = closest(around.current, shape);
     return Seen(entry, around, point, push_of_face(here, around.current, marks(of_key(entry).body), point));
 }
 
-// Adds what a face does to a point; returns the gap, or as much as is sure to be left of it.
+// Adds the forces of a face on a point; returns the gap or a lower bound of it.
 fn face_push(here: Point, entry: u32, most: f32, pushed: ptr<function, Pushed>) -> f32 {
     let around = corners_of(here, entry);
     let shape = patch_of(around.current);
@@ -111,11 +111,11 @@ fn face_push(here: Point, entry: u32, most: f32, pushed: ptr<function, Pushed>) 
     return gap;
 }
 
-// What a body does to a point, by its entries and their gaps: those that are no larger than `most` are looked at. Returns the least.
+// Forces of a body on a point, by its entries and their gaps: entries with gaps up to `most` are evaluated. Returns the least gap.
 fn look(here: Point, list: u32, first_gap: u32, part: vec2<u32>, most: f32, pushed: ptr<function, Pushed>) -> f32 {
     var least = params.skin;
     for (var round = 0u; round < 2u; round++) {
-        // a point that seems to be inside is so only if no other face is nearer
+        // a point that seems to be inside is inside only if no other face is nearer
         if round == 1u && !is_behind(pushed, most) {
             break;
         }
@@ -131,12 +131,12 @@ fn look(here: Point, list: u32, first_gap: u32, part: vec2<u32>, most: f32, push
     return least;
 }
 
-// Viscosity that damps a spring between masses of joint inverse `inverse_mass`.
+// Viscosity for damping a spring between masses of joint inverse `inverse_mass`.
 fn viscosity(stiff: f32, inverse_mass: f32) -> f32 {
     return params.damping * 2.0 * sqrt(stiff / inverse_mass);
 }
 
-// What damping and friction do, once for a point and a body: against the mean motion of the faces that push, by their forces.
+// Damping and friction, once per point and body: against the mean motion of the pushing faces, weighted by their forces.
 fn rub(here: Point, pushed: ptr<function, Pushed>, touch: u32) -> Rubbed {
     let elapsed = row.dt_mid + row.dt_mid - row.dt;
     let share = select(1.0, (*pushed).shared_force, (*pushed).shared_force > 0.0);
@@ -160,7 +160,7 @@ fn rub(here: Point, pushed: ptr<function, Pushed>, touch: u32) -> Rubbed {
     let approach = dot(motion, normal);
     let viscous = viscosity(here.stiff, inverse_mass);
     let pressing = max(size - viscous * approach, 0.0);
-    // over the way since the positions before, with the mean of the forces before and now
+    // over the motion since the previous positions, with the mean of the old and new forces
     let drag = size - pressing;
     add_sum(here.item, SUM_DAMPING, 0.5 * (touches[touch + DAMPED] + drag) * approach * elapsed);
     touches[touch + NORMAL] = pressing;
@@ -188,7 +188,7 @@ fn rub(here: Point, pushed: ptr<function, Pushed>, touch: u32) -> Rubbed {
     return Rubbed(rubbing, rows);
 }
 
-// Adds what a face does to a point to the nodes, with its share of what damping and friction do.
+// Adds the forces of a face on a point to the nodes, with its share of damping and friction.
 fn press(here: Point, entry: u32, pushed: ptr<function, Pushed>, rubbed: Rubbed) {
     var seen = (*pushed).last;
     if entry != seen.entry {
@@ -216,7 +216,7 @@ fn press(here: Point, entry: u32, pushed: ptr<function, Pushed>, rubbed: Rubbed)
     }
 }
 
-// Adds what acts on a point to its nodes.
+// Distributes the force on a point to its nodes.
 fn share_out(here: Point) {
     let plane = arrayLength(&forces) / 3u;
     var rest = own;
@@ -234,7 +234,7 @@ fn share_out(here: Point) {
     }
 }
 
-// The place of a body among the touches of a point; if it `begins` to touch, a free one; else `params.slots`.
+// The index of a body among the touches of a point; if it `begins` to touch, a free index; else `params.slots`.
 fn place_of(item: u32, body: u32, begins: bool) -> u32 {
     var free = params.slots;
     let slots = bound(params.slots, arrayLength(&keys));
@@ -250,7 +250,7 @@ fn place_of(item: u32, body: u32, begins: bool) -> u32 {
     return free;
 }
 
-// Damping, friction, and what is left of a body's touch; whether it still touches.
+// Damping, friction, and the end of a body's touch; whether it still touches.
 fn settle(here: Point, body: u32, depth: f32, pushed: ptr<function, Pushed>, rubbed: ptr<function, Rubbed>) -> bool {
     let touching = (*pushed).features > 0.0;
     let slot = place_of(here.item, body, touching);
@@ -287,7 +287,7 @@ fn penalty(item: u32) {
     let first_gap = (GAPS + params.faces) * item;
     let made = (MADE + params.slots) * item;
     if keys[made] != near[first] {
-        // a new list: all faces are looked at. How deep the point was inside stays known; before the first one it may be anywhere
+        // a new list: all faces are evaluated. The penetration is kept; before the first list it may be anything up to `depth`
         let inner = select(gaps[first_gap + INNER], params.depth, keys[made] == EMPTY);
         keys[made] = near[first];
         for (var i = 0u; i < GAPS + faces_listed; i++) {
@@ -303,7 +303,7 @@ fn penalty(item: u32) {
     let stiff = points[POINT * item + 4u];
     let radius = full_radius * row.radius;
     let here = Point(item, carried_by(item, 0u), point_of(item), stiff, full_radius, radius, size);
-    // a point that was inside is no deeper than this now
+    // upper bound of the penetration of a point that was inside
     let deepest = gaps[first_gap + INNER] + closing;
     let most = deepest + margin(radius + deepest);
     var least = params.skin;

@@ -1,9 +1,9 @@
-// The potential of a point near the closed surface of a body, and what pushes the point; see the twin.
+// The contact potential of a point near the closed surface of a body, and its forces on the point; see the twin.
 
 #include "contact/surface"
 #include "contact/face"
 
-// How much farther than what is nearest, at a `distance`, a face may be and still count as equally near, with room, mm.
+// Tolerance within which a face counts as nearest at a `distance`, with a safety margin, mm.
 fn margin(distance: f32) -> f32 {
     return 2.0 * TIE * distance + GAP_ROUNDING;
 }
@@ -19,7 +19,8 @@ struct Point {
     size: f32,
 }
 
-// Where the surface of a body is nearest to a point: the entry of its face, unit vector from there, distance, height above the face.
+// The nearest point of a body's surface: the entry of its face, unit vector from there to the point, distance, height above the
+// face.
 struct Nearest {
     found: bool,
     entry: u32,
@@ -28,7 +29,7 @@ struct Nearest {
     height: f32,
 }
 
-// How a face, with the edges and corners that it owns, pushes a point: what acts on its corners; energy, sum of forces, features.
+// Forces of a face on a point, with the edges and corners that it owns: forces on its corners; energy, sum of forces, features.
 struct Push {
     pull: array<vec3<f32>, 4>,
     energy: f32,
@@ -36,7 +37,7 @@ struct Push {
     count: f32,
 }
 
-// A face of a list that was looked at.
+// An evaluated face of a list.
 struct Seen {
     entry: u32,
     corners: Corners,
@@ -44,7 +45,7 @@ struct Seen {
     push: Push,
 }
 
-// What a body does to a point, see the twin.
+// Forces of a body on a point, see the twin.
 struct Pushed {
     nearest: Nearest,
     last: Seen,
@@ -59,7 +60,7 @@ struct Pushed {
     inverse_mass: f32,
 }
 
-// Whether a place is nearer than what is known.
+// Whether a place is nearer than the known one.
 fn is_nearer(pushed: ptr<function, Pushed>, point: Closest) -> bool {
     let known = (*pushed).nearest;
     let tie = known.distance * TIE + 0.1 * GAP_ROUNDING;
@@ -67,19 +68,20 @@ fn is_nearer(pushed: ptr<function, Pushed>, point: Closest) -> bool {
     return !known.found || apart < -tie || apart <= tie && abs(point.height) > abs(known.height);
 }
 
-// Whether the point is behind the nearest place that is known, no deeper than what is pushed out, nor than `most`, which it can have
-// come to since it was looked at: at a corner of a crumpled surface, a point in front may look as if it were behind.
+// Whether the point is behind the nearest known place, within the depth that is pushed out, and within `most`, the largest
+// depth it can have reached since its last evaluation: at a corner of a crumpled surface, a point in front may appear to be
+// behind.
 fn is_behind(pushed: ptr<function, Pushed>, most: f32) -> bool {
     let known = (*pushed).nearest;
     return known.found && known.height < 0.0 && known.distance < min(most, params.depth);
 }
 
-// Distance from which on a face cannot change what is nearest, mm.
+// Distance beyond which a face cannot change the nearest place, mm.
 fn beyond(pushed: ptr<function, Pushed>) -> f32 {
     return (*pushed).nearest.distance * (1.0 - 2.0 * TIE) - 0.2 * GAP_ROUNDING;
 }
 
-// Adds a force on the point, `away` from a place by weights of the corners, and its energy.
+// Adds a force on the point in the direction `away` from a place given by corner weights, and its energy.
 fn add_push(push: ptr<function, Push>, weights: vec4<f32>, away: vec3<f32>, size: f32, energy: f32) {
     (*push).energy = (*push).energy + energy;
     (*push).pressing = (*push).pressing + size;
@@ -100,7 +102,7 @@ fn add_border(push: ptr<function, Push>, here: Point, border: OnEdge, side: f32)
     }
 }
 
-// How a face pushes, by its marks.
+// Forces of a face, with the edges and corners in its marks.
 fn push_of_face(here: Point, q: array<vec3<f32>, 4>, bits: u32, point: Closest) -> Push {
     var push = Push(array<vec3<f32>, 4>(), 0.0, 0.0, 0.0);
     let depth = here.radius - point.distance;
@@ -121,7 +123,7 @@ fn push_of_face(here: Point, q: array<vec3<f32>, 4>, bits: u32, point: Closest) 
     return push;
 }
 
-// Force and energy that push a point out that is inside and so far from the surface.
+// Force and energy on a point inside, for its depth below the surface.
 fn out_force(here: Point, depth: f32) -> f32 {
     return here.stiff * ((here.radius + depth) + max(here.radius - depth, 0.0));
 }
@@ -132,7 +134,7 @@ fn out_energy(here: Point, depth: f32) -> f32 {
     return 0.5 * here.stiff * (whole * whole - outside * outside);
 }
 
-// Adds what pushes a point out that is inside; returns how deep it is, mm.
+// Adds the force that pushes out a point inside; returns its depth, mm.
 fn push_out(here: Point, pushed: ptr<function, Pushed>) -> f32 {
     let known = (*pushed).nearest;
     let size = out_force(here, known.distance);

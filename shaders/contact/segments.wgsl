@@ -1,13 +1,13 @@
 // Contact of two straight segments A and B: a potential of the distance from B, integrated along A; see the twin.
 
-// Two segments, seen from the first end of A, mm.
+// Two segments, relative to the first end of A, mm.
 struct Segments {
     along: vec3<f32>,
     start: vec3<f32>,
     other: vec3<f32>,
 }
 
-// Points of A from `low` to `high`, whose partners on B are `base + slope s`; all from 0 to 1.
+// Points of A from `low` to `high`, with projections `base + slope s` on B; all from 0 to 1.
 struct Part {
     low: f32,
     high: f32,
@@ -15,7 +15,7 @@ struct Part {
     slope: f32,
 }
 
-// Where the first end of B, its inside and its second end are closest, and where the first end is not.
+// The parts of A where the first end of B, its inside and its second end are closest, and the part where the first end is not.
 struct Parts {
     first: Part,
     inside: Part,
@@ -23,7 +23,7 @@ struct Parts {
     beyond: Part,
 }
 
-// From the partner on B to a point s of A: at s = 0, and its change with s, mm.
+// Vector from the projection on B to a point s of A: its value at s = 0, and its change with s, mm.
 struct Between {
     base: vec3<f32>,
     slope: vec3<f32>,
@@ -79,7 +79,7 @@ fn distance_of(segments: Segments) -> f32 {
 }
 
 #if PAIRS
-// What presses two segments apart.
+// Contact forces between two segments.
 struct Push {
     energy: f32,
     growth: f32,
@@ -92,7 +92,7 @@ struct Push {
     weight: f32,
 }
 
-// From where to where in a part q is below `square`; from a point to the same if nowhere.
+// Interval of a part in which q is below `square`; an empty interval if there is none.
 fn touching(part: Part, line: Between, square: f32) -> vec2<f32> {
     let curvature = max(dot(line.slope, line.slope), square * STRAIGHT);
     let half_slope = -dot(line.base, line.slope);
@@ -110,7 +110,7 @@ fn touching(part: Part, line: Between, square: f32) -> vec2<f32> {
     return vec2<f32>(max(min(a, b), part.low), min(max(a, b), part.high));
 }
 
-// Adds what a point of Gauss stands for.
+// Adds the contribution of a Gauss point.
 fn add_point(push: ptr<function, Push>, part: Part, line: Between, s: f32, share: f32, reach: f32) {
     let square = reach * reach;
     let scale = 0.5 / square;
@@ -134,7 +134,7 @@ fn add_point(push: ptr<function, Push>, part: Part, line: Between, s: f32, share
     (*push).weight = (*push).weight + pushes;
 }
 
-// Adds a part, or takes it off with a negative strength.
+// Adds a part, or subtracts it with a negative strength.
 fn add_part(push: ptr<function, Push>, segments: Segments, part: Part, reach: f32, strength: f32) {
     let line = between_parts(segments, part);
     let range = touching(part, line, reach * reach);
@@ -147,8 +147,8 @@ fn add_part(push: ptr<function, Push>, segments: Segments, part: Part, reach: f3
     add_point(push, part, line, range.x + length * 0.8872983346207417, strength * length * (5.0 / 18.0), reach);
 }
 
-// What presses them apart when they touch at a distance of `reach` (mm), with the penalty times the length of A at rest `strength`
-// (N/mm); whether B owns the joint at its first end.
+// Contact forces of two segments that touch at a distance of `reach` (mm), with `strength` (N/mm), the penalty times the
+// reference length of A; `owns` tells whether B owns the joint at its first end.
 fn push_of(segments: Segments, reach: f32, strength: f32, owns: bool) -> Push {
     let parts = parts_of(segments);
     var push: Push;

@@ -1,5 +1,5 @@
-// How fast nodes are, whether they are still numbers in range, and with CONTACT how far they have moved since there was last a look
-// around for candidates.
+// Contact skin (Verlet skin): largest nodal speed, validity of positions and, with CONTACT, the distance travelled since the
+// last candidate check.
 
 #include "kernel/position"
 #if travel

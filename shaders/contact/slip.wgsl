@@ -1,4 +1,4 @@
-// How far contact points have slipped since the start.
+// Accumulated slip of contact points since the start.
 
 #if ROOT
 fn slip(item: u32) {

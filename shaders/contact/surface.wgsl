@@ -1,5 +1,5 @@
-// The surfaces of yarns as tables of faces, and points carried by nodes: places relative to a node.
-// What includes this binds `reference`, `quanta` and `remainder`; with FACES also `faces`, and with POINTS `nodes` and `points`.
+// The surfaces of yarns as tables of faces, and points carried by nodes: positions are relative to a node.
+// The including file binds `reference`, `quanta` and `remainder`; with FACES also `faces`, and with POINTS `nodes` and `points`.
 
 #include "kernel/row"
 #include "kernel/vector"
@@ -14,12 +14,12 @@ struct Imaged {
     image: vec2<i32>,
 }
 
-// Node and image of a coded one.
+// Decodes a coded node and its image.
 fn of_coded(coded: u32) -> Imaged {
     return Imaged(coded & 67108863u, vec2<i32>(i32(coded >> 26u & 3u) - 1, i32(coded >> 28u) - 1));
 }
 
-// A place relative to another one, in the reference and now.
+// A position relative to another, in the reference and current states.
 struct Offset {
     reference: vec3<f32>,
     current: vec3<f32>,
@@ -38,7 +38,7 @@ fn rem_euclid(a: i32, n: i32) -> i32 {
     return select(r, r + n, r < 0);
 }
 
-// Reference and current position of a node in an image relative to another one.
+// Reference and current position of a node in an image relative to another node.
 fn from_node(seen: Imaged, base: u32) -> Offset {
 #if PERIODIC
     let rest = lattice_between(seen.node, base, seen.image * params.period);
@@ -50,12 +50,12 @@ fn from_node(seen: Imaged, base: u32) -> Offset {
 }
 
 #if FACES
-// Marks of a face: owned edges and corners, along which of x and y its body goes on, and the body.
+// Marks of a face: owned edges and corners, the axes x and y along which its body continues, and the body.
 fn marks(face: u32) -> u32 {
     return faces[FACE * face + 4u];
 }
 
-// Key of the body and the lateral image that an entry belongs to.
+// Key of the body and lateral image of an entry.
 fn body_of(entry: u32) -> u32 {
     let seen = of_key(entry);
     let bits = marks(seen.body);
@@ -63,14 +63,14 @@ fn body_of(entry: u32) -> u32 {
     return key(bits >> 10u, lateral);
 }
 
-// A corner of a face in an image, seen from a point that lies `aside` beside a node.
+// A corner of a face in an image, relative to a point at the offset `aside` from a node.
 fn corner(face: u32, a: u32, image: vec2<i32>, base: u32, aside: Offset) -> Offset {
     let own = of_coded(faces[FACE * face + a]);
     let seen = from_node(Imaged(own.node, image + own.image), base);
     return Offset(seen.reference - aside.reference, seen.current - aside.current);
 }
 
-// The corners of a face in an image, seen from there.
+// The corners of a face in an image, relative to the same point.
 fn corners(face: u32, image: vec2<i32>, base: u32, aside: Offset) -> Corners {
     let c0 = corner(face, 0u, image, base, aside);
     let c1 = corner(face, 1u, image, base, aside);
@@ -91,7 +91,7 @@ fn carried_by(item: u32, a: u32) -> u32 {
     return of_coded(nodes[CARRIED * item + a]).node;
 }
 
-// A point, relative to its first node, in the reference and now.
+// A point, relative to its first node, in the reference and current states.
 fn point_of(item: u32) -> Offset {
     let base = carried_by(item, 0u);
     var at = Offset(vec3<f32>(0.0), vec3<f32>(0.0));

@@ -1,5 +1,5 @@
-// Contact of beams with beams: every step the forces of the pairs that touch, from the line of one thread integrated over that of the
-// other, with damping and friction at the point where these act.
+// Contact of beams with beams: every step the forces of the touching pairs, from the integral over the lines of both threads,
+// with damping and friction at the point of action.
 
 #define PAIRS
 #define VELOCITY
@@ -10,7 +10,7 @@
 #include "contact/pairs"
 
 #if ROOT
-// Two beams that touch: their nodes and weights, the penalty times their lengths, N/mm, and their pieces at rest.
+// Two touching beams: their nodes and weights, the penalty times their lengths, N/mm, and their reference pieces.
 struct Pair {
     nodes: array<vec4<u32>, 2>,
     weights: array<array<vec4<f32>, 2>, 2>,
@@ -18,7 +18,7 @@ struct Pair {
     rest: Segments,
 }
 
-// Whether beam `a` takes the joint at the first end of `b` off: where it is a pair with the beam before `b` too.
+// Whether beam `a` subtracts the joint at the first end of `b`: it does if it also forms a pair with the beam before `b`.
 fn owns(a: u32, b: u32, image: vec2<i32>) -> bool {
     let before = before_of(b, image);
     return before.body != b && before.body > a && !are_near(a, before.body, before.image, params.self_arc);
@@ -29,17 +29,17 @@ fn reach_now() -> f32 {
     return 2.0 * params.thread_radius * row.radius;
 }
 
-// Increment of that distance since the step before, mm.
+// Increment of that distance since the previous step, mm.
 fn growth_now() -> f32 {
     return 2.0 * params.thread_radius * row.radius_increment;
 }
 
-// Time since the step before, s.
+// Time since the previous step, s.
 fn elapsed() -> f32 {
     return row.dt_mid + row.dt_mid - row.dt;
 }
 
-// Lets gaps close, and tells whether one of a beam's pairs can touch.
+// Reduces the gap counters, and tells whether one of a beam's pairs can touch.
 fn can_touch(beam: u32) -> bool {
     let slots = params.beam_slots;
     let weights = most_weights(beam);
@@ -59,13 +59,14 @@ fn can_touch(beam: u32) -> bool {
 }
 
 #if FRICTION
-// Tangential stiffness of a beam's pairs, N/mm: that of a contact as long as the beam, or as a thread is thick.
+// Tangential stiffness of a beam's pairs, N/mm, for a contact length equal to the beam length or the thread diameter, whichever
+// is less.
 fn tangential_of(beam: u32) -> f32 {
     return params.thread_thread * min(beams[TABLE * beam + 3u], 2.0 * params.thread_radius) * params.tangential;
 }
 #endif
 
-// Lets go of what friction holds.
+// Releases the elastic tangential displacement of friction.
 fn release(beam: u32, s: u32) {
 #if FRICTION
     let elastic = vec3<f32>(states[s + 1u], states[s + 2u], states[s + 3u]);
@@ -76,7 +77,7 @@ fn release(beam: u32, s: u32) {
 #endif
 }
 
-// How fast points of two pieces separate, mm/s, and the square of the frequency of lengths that touch, 1/s².
+// Separation velocity of points of two pieces, mm/s, and the squared frequency of the touching lengths, 1/s².
 struct Relative {
     motion: vec3<f32>,
     square: f32,
@@ -102,7 +103,7 @@ fn relative(pair: Pair, s: f32, t: f32) -> Relative {
     return sum;
 }
 
-// Adds damping and friction to an elastic force of size `pressed` (N), at the point where it acts; see the twin.
+// Adds damping and friction to an elastic force of size `pressed` (N), at its point of action; see the twin.
 fn resist(beam: u32, slot: u32, pair: Pair, pressed: f32, push: ptr<function, Push>) {
     let s = (*push).at.x / (*push).weight;
     let t = (*push).at.y / (*push).weight;
@@ -147,7 +148,7 @@ fn resist(beam: u32, slot: u32, pair: Pair, pressed: f32, push: ptr<function, Pu
     (*push).other_rows = (*push).other_rows + row_sum * vec2<f32>(1.0 - t, t);
 }
 
-// Whether components of a force fit their integers; else names the node.
+// Whether the components of a force fit their integers; else records the node.
 fn is_in_range(force_quanta: vec3<f32>, node: u32) -> bool {
     let fits = all(abs(force_quanta) < vec3<f32>(MOST_QUANTA));
     if !fits || !(is_finite(force_quanta.x) && is_finite(force_quanta.y) && is_finite(force_quanta.z)) {
@@ -166,7 +167,7 @@ fn add_force(node: u32, whole: vec3<i32>) {
     atomicAdd(&forces[node + 2u * plane], whole.z);
 }
 
-// Adds forces on the ends of both pieces to their nodes, in integers whose sum is zero.
+// Adds forces on the ends of both pieces to their nodes, as integers whose sum is zero.
 fn add_forces(pair: Pair, push: Push) {
     var left = vec3<i32>(0);
     for (var n = 0u; n < 8u; n++) {
@@ -197,7 +198,7 @@ fn add_rows(pair: Pair, push: Push, weights: f32) {
     add_stiffness(push.other_rows.y * weights, Weighted(4u, pair.nodes[1], pair.weights[1][1]));
 }
 
-// Forces of a beam, whose piece is known, and that of a slot; whether they touch.
+// Forces between a known beam piece and the beam of a slot; whether they touch.
 fn touches_pair(beam: u32, own: Piece, slot: u32) -> bool {
     let candidate = of_key(keys[slot]);
     let other = candidate.body;

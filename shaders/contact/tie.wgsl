@@ -1,4 +1,4 @@
-// Ties: a node that is held at a point of another body's surface by a spring.
+// Ties: springs that hold a node at a point of another body's surface.
 
 #include "kernel/vector"
 #include "kernel/node"
@@ -19,7 +19,7 @@ fn tie(item: u32) {
         vec4<f32>(values[v], values[v + 1u], values[v + 2u], values[v + 3u]),
     );
     let spring = values[v + 4u];
-    // from the held node to its place on the face
+    // from the tied node to its point on the face
     var gap = vec3<f32>(0.0);
     for (var a = 0u; a < 4u; a++) {
         gap = displacement_between(corners.nodes[a], held) * corners.weights[a] + gap;

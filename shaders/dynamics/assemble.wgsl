@@ -1,4 +1,4 @@
-// Accelerations: each node gathers its corner slots in a fixed order, adds contact and its weight, and divides by its mass.
+// Accelerations: each node gathers its corner slots in a fixed order, adds contact forces and weight, and divides by its mass.
 
 #include "kernel/row"
 
@@ -26,7 +26,7 @@ struct Params {
 @group(2) @binding(1) var<uniform> params: Params;
 
 #if CONTACT
-// Contact force of one component in N, set back to zero.
+// Contact force component in N; reset to zero.
 fn taken(at: u32) -> f32 {
     let quanta = contact_force[at];
     if quanta != 0 {

@@ -1,4 +1,4 @@
-// Kinetic energy, and that of stretched threads, as totals.
+// Kinetic energy, and strain energy of stretched threads, as totals.
 
 #include "dynamics/totals"
 

@@ -1,4 +1,4 @@
-// Fibre-line selective mass scaling: one workgroup works on one line, and solves its system by parallel cyclic reduction.
+// Fibre lines: selective mass scaling. One workgroup works on one line, and solves its system by parallel cyclic reduction.
 
 #include "kernel/row"
 #define REFERENCE
@@ -6,17 +6,17 @@
 #include "kernel/vector"
 
 #if ROOT
-// Stations that an invocation looks after; STATIONS is the longest line.
+// Stations per invocation; STATIONS is the length of the longest line.
 const ROUNDS: u32 = (STATIONS + WORKGROUP - 1u) / WORKGROUP;
 
 struct Params {
-    // Strength β of the added inertia.
+    // Strength β of the added mass.
     beta: f32,
 }
 
 @group(2) @binding(1) var<uniform> params: Params;
 
-// Direction of the segment that starts at a station, zero for none, and inverse mass of the station.
+// Direction of the segment that starts at a station, zero without a segment, and inverse mass of the station.
 var<workgroup> stations: array<vec4<f32>, STATIONS>;
 // Diagonal, coupling to the next row of the same subsystem, right side, and coupling to the last row.
 var<workgroup> rows: array<vec4<f32>, STATIONS>;
@@ -43,7 +43,7 @@ fn coupling(i: u32, next: u32) -> f32 {
     return -(dot(stations[i].xyz, stations[next].xyz) * stations[next].w);
 }
 
-// Unknown of a row once the reduction has left diagonals only; `end` is that of the last row.
+// Unknown of a row after the reduction to diagonals; `end` is the unknown of the last row.
 fn solution(i: u32, end: f32) -> f32 {
     return (rows[i].z - rows[i].w * end) / rows[i].x;
 }
@@ -128,7 +128,7 @@ fn fibre_lines(number: u32, local: u32) {
         workgroupBarrier();
     }
 
-    // what the first and the last but one row are coupled to the last with
+    // coupling of the first row and of the last but one to the last row
     let back = coupling(last, 0u);
     let ahead = coupling(last - 1u, last);
     let low = rows[0];

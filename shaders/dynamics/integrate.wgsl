@@ -1,4 +1,4 @@
-// Central differences.
+// Time integration by central differences.
 
 #include "kernel/row"
 #include "kernel/position"
@@ -30,7 +30,7 @@ fn integrate(node: u32) {
 #endif
 #if WORKS
     let own_mass = mass[node];
-    // what acts beyond the mass of the node
+    // effective mass beyond the nodal mass
     var extra = 0.0;
 #endif
 #if MASS_ADDED

@@ -2,7 +2,7 @@
 
 #if ROOT
 #if held_limit
-// Leaves out nodes that are held altogether.
+// Excludes fully prescribed nodes, which do not vibrate.
 fn held_limit(item: u32) {
     if conditions[2u * item + 1u] == 7u {
         limit[arrayLength(&limit) / 2u + conditions[2u * item]] = 0.0;
@@ -18,7 +18,7 @@ struct Params {
 @group(2) @binding(1) var<uniform> params: Params;
 
 #if BENDING
-// How much stiffer a bend is than a straight one.
+// Stiffness of a bend relative to a straight one.
 fn stiffening(bend: u32) -> f32 {
     let stiffness = bends[BEND * bend];
     let rest = bends[BEND * bend + 1u];
@@ -34,7 +34,7 @@ fn stiffening(bend: u32) -> f32 {
 }
 #endif
 
-// What a row is weighed with at a node: one, or R/m.
+// Weight of a row at a node: one, or R/m.
 fn weight(node: u32) -> f32 {
 #if weighed_limit
     return limit[arrayLength(&limit) / 2u + node];
@@ -53,7 +53,7 @@ fn both(beam: u32) -> f32 {
 }
 
 #if BENDING
-// Mean weight of the nodes of a bend, by their rows.
+// Mean weight over the nodes of a bend, weighted by its row sums.
 fn mean(bend: u32) -> f32 {
 #if weighed_limit
     let first = pairs[2u * bend];
@@ -67,9 +67,9 @@ fn mean(bend: u32) -> f32 {
 }
 #endif
 
-// The row sum of a node, weighed if there are weights: bounds of hexahedra are already.
+// The row sum of a node, weighed if there are weights; the bounds of hexahedra are already weighed.
 fn row_sum(node: u32) -> f32 {
-    // the nodes of short lines are alike
+    // the nodes of short lines have equal weights
     var k = constant[node] * weight(node);
     if node < params.first_thread {
         for (var i = 0u; i < SOLID; i++) {
@@ -101,9 +101,9 @@ fn row_sum(node: u32) -> f32 {
 }
 
 #if weighed_limit
-// The mean of R/m around each node.
+// The weighted mean of R/m over each node and its neighbours.
 fn weighed_limit(node: u32) {
-    // nodes that are held stay out
+    // fully prescribed nodes are excluded
     if weight(node) > 0.0 {
         out[node] = row_sum(node) / limit[node];
     } else {
@@ -111,7 +111,7 @@ fn weighed_limit(node: u32) {
     }
 }
 #else
-// Assembles the row sums of element stiffness.
+// Assembles the row sums of the element stiffness.
 fn element_limit(node: u32) {
     let k = row_sum(node);
     limit[node] = k;

@@ -1,8 +1,8 @@
-// Totals: columns of numbers added up, and the worst of them, part by part. A workgroup works on a part.
+// Totals: sums and maxima of columns, part by part. A workgroup works on a part.
 
 var<workgroup> sums: array<f32, WORKGROUP>;
 
-// Adds what the invocations of a workgroup found, the upper half to the lower until one sum is left.
+// Adds the partial results of a workgroup, the upper half to the lower until one sum is left.
 fn add_up(found: f32, local: u32) -> f32 {
     sums[local] = found;
     for (var half = WORKGROUP / 2u; half > 0u; half = half / 2u) {
@@ -27,7 +27,7 @@ struct Params {
 
 @group(2) @binding(1) var<uniform> params: Params;
 
-// Where a number of a column is.
+// Index of a number of a column.
 fn place_of(number: u32, column: u32) -> u32 {
     return params.start + number / params.lanes * params.stride + column * params.lanes + number % params.lanes;
 }

@@ -1,5 +1,5 @@
-// Axial part of a 2-node beam. What includes this binds `ends`, `beams`, `quanta` and `remainder`, with VIRIAL in periodic scenes
-// also `virial`.
+// Axial part of a 2-node beam. The including file binds `ends`, `beams`, `quanta` and `remainder`, and with VIRIAL in periodic
+// scenes also `virial`.
 
 #if ROOT
 #define VIRIAL
@@ -9,7 +9,7 @@
 #include "kernel/node"
 #include "kernel/vector"
 
-// A beam's reference vector and its change, mm.
+// The reference vector of a beam and its change, mm.
 struct Beam {
     reference: vec3<f32>,
     change: vec3<f32>,

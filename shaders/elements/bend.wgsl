@@ -1,4 +1,4 @@
-// Bending between two consecutive beams, without rotational unknowns.
+// Bending between two consecutive beams, without rotational degrees of freedom.
 
 #define VIRIAL
 #include "elements/beam2"
@@ -16,7 +16,7 @@ fn force(bend: u32) {
     let tangent0 = current0 * inverse0;
     let tangent1 = current1 * inverse1;
     let cosine = dot(tangent0, tangent1);
-    // a thread folded onto itself: tan(θ/2) ends at 10
+    // a thread folded onto itself: tan(θ/2) is limited to 10
     let opening = max(1.0 + cosine, 0.02);
     let turned = cross(tangent0, tangent1);
     let smoothing = min(SMOOTHING, 0.5 * rest);

@@ -1,5 +1,4 @@
-// What hexahedra share: one invocation works on one lane of a block. The element that includes this says how many numbers a
-// SHAPE has.
+// Common to all hexahedra: one invocation works on one lane of a block. The including element defines the length of a SHAPE.
 
 #include "kernel/row"
 #include "kernel/position"
@@ -8,13 +7,13 @@
 struct Params {
     // Nodes in a plane of the position buffers.
     nodes: u32,
-    // Factor on the axial stiffness of fibres across their lines; 0 without lines.
+    // Factor on the axial fibre stiffness across the fibre lines; 0 without lines.
     left: f32,
 }
 
 @group(2) @binding(1) var<uniform> params: Params;
 
-// A hexahedron: where its numbers start in the tables.
+// A hexahedron: the start of its numbers in the tables.
 struct Hex {
     corners: u32,
     shape: u32,
@@ -63,14 +62,14 @@ fn node_remainder(node: u32) -> vec3<f32> {
     return vec3<f32>(remainder[node], remainder[node + params.nodes], remainder[node + 2u * params.nodes]);
 }
 
-// Displacement of a corner (in mesh order) from a position.
+// Displacement of a corner (in mesh order) relative to a position.
 fn displacement(h: Hex, corner: u32, from_quanta: vec3<i32>, from_remainder: vec3<f32>) -> vec3<f32> {
     let node = corners[h.corners + corner * LANES];
     return vec3<f32>(node_quanta(node) - from_quanta) * QUANTUM + (node_remainder(node) - from_remainder);
 }
 
 #if PERIODIC
-// The macroscopic gradient in the fibre's frame, Qᵀ A Q.
+// The macroscopic displacement gradient in the fibre's frame, Qᵀ A Q.
 fn macroscopic(q: Tensor) -> Tensor {
     let g = gradient();
     return (q * Tensor(g[0], g[1], g[2])) * transpose(q);
@@ -78,7 +77,7 @@ fn macroscopic(q: Tensor) -> Tensor {
 #endif
 
 #if force
-// Writes three components, a lane apart.
+// Writes three components, one lane stride apart.
 fn store(at: u32, a: vec3<f32>) {
     out[at] = a.x;
     out[at + LANES] = a.y;
@@ -92,7 +91,7 @@ fn add_to_row(at: u32, a: vec3<f32>) {
     out_virial[at + 2u * LANES] = out_virial[at + 2u * LANES] + a.z;
 }
 
-// Adds V P, in the fibre's frame, to the stress sum of a block.
+// Adds V P, in the fibre's frame, to the virial stress sum of a block.
 fn add_virial(block: u32, lane: u32, q: Tensor, stress: Tensor) {
     // Q A Qᵀ
     let turned = (transpose(q) * stress) * q;
@@ -105,10 +104,10 @@ fn add_virial(block: u32, lane: u32, q: Tensor, stress: Tensor) {
 #endif
 
 #if bound
-// Corners in mesh order of the binary ones.
+// Mesh order of the binary corners.
 const MESH_ORDER = array<u32, 8>(0u, 1u, 3u, 2u, 4u, 5u, 7u, 6u);
 
-// What the rows of stiffness are weighed with at a binary corner: one, or R/m of the node.
+// Weight of the stiffness rows at a binary corner: one, or R/m of the node.
 fn weight(h: Hex, corner: u32) -> f32 {
 #if WEIGHED
     return weights[params.nodes + corners[h.corners + MESH_ORDER[corner] * LANES]];
@@ -117,7 +116,7 @@ fn weight(h: Hex, corner: u32) -> f32 {
 #endif
 }
 
-// Writes the rows of stiffness of the binary corners.
+// Writes the stiffness row sums of the binary corners.
 fn store_rows(block: u32, lane: u32, rows: array<f32, 8>) {
     let at = BOUND * block + lane;
     out[at] = rows[0];

@@ -19,7 +19,7 @@ fn volume(h: Hex, point: u32) -> f32 {
     return shapes[h.shape + (10u * point + 9u) * LANES];
 }
 
-// Displacement of a corner (in mesh order) from a position, in the fibre's frame.
+// Displacement of a corner (in mesh order) relative to a position, in the fibre's frame.
 fn local_displacement(h: Hex, corner: u32, from_quanta: vec3<i32>, from_remainder: vec3<f32>, q: Tensor) -> vec3<f32> {
     let global = displacement(h, corner, from_quanta, from_remainder);
     return fma(q[2], global.zzz, fma(q[1], global.yyy, q[0] * global.x));
@@ -30,7 +30,7 @@ fn derivatives(h: Hex, q: Tensor) -> Derivatives {
     let node = corners[h.corners];
     let at = node_quanta(node);
     let rest = node_remainder(node);
-    // binary order; the first corner does not move against itself
+    // binary order; the first corner is the reference of displacements
     let u1 = local_displacement(h, 1u, at, rest, q);
     let u2 = local_displacement(h, 3u, at, rest, q);
     let u3 = local_displacement(h, 2u, at, rest, q);
@@ -71,7 +71,7 @@ fn spread(g: array<vec3<f32>, 4>) -> array<vec3<f32>, 4> {
     return array<vec3<f32>, 4>(near_far(f0, f1), far_near(f0, f1), near_far(f2, f3), far_near(f2, f3));
 }
 
-// For each direction, which of the four points of the other two directions a Gauss point is.
+// Index of a Gauss point among the four points of the other two directions, for each direction.
 fn others(point: u32) -> vec3<u32> {
     let i = point & 1u;
     let j = (point >> 1u) & 1u;
@@ -80,7 +80,7 @@ fn others(point: u32) -> vec3<u32> {
 }
 
 #if PERIODIC
-// The macroscopic gradient in the frame of the fibre at hand.
+// The macroscopic displacement gradient in the frame of the current fibre.
 var<private> added: Tensor;
 #endif
 
@@ -106,7 +106,7 @@ fn gradient_at(h: Hex, point: u32, d: ptr<function, Derivatives>) -> Tensor {
 }
 
 #if force
-// What the Gauss points of a hexahedron add up to: forces conjugate to derivatives, and for periodic scenes V P̄.
+// Sums over the Gauss points of a hexahedron: forces conjugate to the derivatives, and for periodic scenes V P̄.
 struct Sum {
     forces: Derivatives,
     stress: Tensor,
@@ -207,7 +207,7 @@ fn slope_at(h: Hex, point: u32, corner: u32) -> vec3<f32> {
     return fma(slope.zzz, inverse(h, point, 2u), lower);
 }
 
-// Displacement of the high against the low corner of the four edges along ξ.
+// Displacement of the high corner relative to the low corner of the four edges along ξ.
 fn edges(h: Hex, q: Tensor) -> array<vec3<f32>, 4> {
     let node = corners[h.corners];
     let at = node_quanta(node);
@@ -221,7 +221,7 @@ fn edges(h: Hex, q: Tensor) -> array<vec3<f32>, 4> {
     );
 }
 
-// Sine of the angle between a fibre at a Gauss point and an edge, from the edge at rest and its change.
+// Sine of the angle between the fibre at a Gauss point and an edge, from the reference edge and its change.
 fn sine_between(rest: vec3<f32>, change: vec3<f32>, fibre: vec3<f32>) -> f32 {
     var now = rest + change;
 #if PERIODIC

@@ -1,4 +1,4 @@
-// 8-node hexahedron with one integration point and hourglass control: one invocation works on one lane of a block.
+// 8-node hexahedron with one Gauss point and hourglass control: one invocation works on one lane of a block.
 
 #include "elements/block"
 
@@ -23,8 +23,8 @@ fn shape_vector(h: Hex, first: u32) -> vec3<f32> {
     return vec3<f32>(entry(h, first), entry(h, first + 1u), entry(h, first + 2u));
 }
 
-// Half the difference of B at both ends of an edge along ξ: strain of fibres comes from differences of near nodes, which f32
-// does not round.
+// Half the difference of B at both ends of an edge along ξ: fibre strain is computed from differences of near nodes, which are
+// exact in f32.
 fn difference_of(h: Hex, edge: u32) -> vec3<f32> {
     return shape_vector(h, 6u * edge);
 }
@@ -53,7 +53,7 @@ fn deformation(h: Hex, q: Tensor) -> Deformation {
     let node = corners[h.corners];
     let at = node_quanta(node);
     let rest = node_remainder(node);
-    // binary order; the first corner does not move against itself
+    // binary order; the first corner is the reference of displacements
     let u1 = displacement(h, 1u, at, rest);
     let u2 = displacement(h, 3u, at, rest);
     let u3 = displacement(h, 2u, at, rest);
@@ -106,7 +106,7 @@ fn force(number: u32) {
     let q = frame(h);
     let state = deformation(h, q);
     let weighted = stress(material(h), state.h) * volume(h);
-    // what is conjugate to the gradient: stress, less what the modes take from linear displacements
+    // conjugate to the gradient: stress, minus the response of the hourglass modes to linear displacements
     var conjugate = weighted * q;
     let g0 = entry(h, STIFFNESS) * state.modes[0];
     let g1 = entry(h, STIFFNESS + 1u) * state.modes[1];
@@ -168,7 +168,7 @@ fn sign_of(mode: u32, corner: u32) -> f32 {
     return vec4<f32>(s.y * s.z, s.x * s.z, s.x * s.y, s.x * s.y * s.z)[mode];
 }
 
-// Adds the rows of a stiffness that is bounded by k times the products of the sizes of its corners.
+// Adds the row sums of a stiffness matrix bounded by k times the products of its corner magnitudes.
 fn add_rows(rows: ptr<function, array<f32, 8>>, k_total: f32, sizes: array<f32, 8>) {
     var s = sizes;
     for (var a = 0u; a < 8u; a++) {
@@ -202,8 +202,8 @@ fn bound(number: u32) {
     if params.left == 0.0 {
         add_rows(&rows, m.along * here * sum_slopes.x, sizes);
     } else {
-        // fibres are stiff along their mean, fibre lines heavy along each edge: what is between these directions is not
-        // covered, (d + e)² ≤ 2 d² + 2 e²
+        // fibre stiffness acts along the mean fibre, fibre lines along each edge: the difference between these directions is
+        // not covered, (d + e)² ≤ 2 d² + 2 e²
         total = 0.0;
         for (var a = 0u; a < 8u; a++) {
             let b = abs(slope(h, a).x);

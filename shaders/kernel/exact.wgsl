@@ -1,4 +1,4 @@
-// The arithmetic that a device must get right to the last bit.
+// Arithmetic that a device must get right to the last bit.
 
 #include "kernel/position"
 

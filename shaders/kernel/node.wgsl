@@ -1,9 +1,9 @@
-// Access to the state of nodes: three planes (x, y, z) a buffer. Bound as `quanta` and `remainder`, with REFERENCE also
+// Access to nodal state: three planes (x, y, z) per buffer. Bound as `quanta` and `remainder`, with REFERENCE also
 // `reference`, with VELOCITY also `velocity`.
 
 #include "kernel/position"
 
-// Displacement of `a` less that of `b`, mm.
+// Displacement of `a` minus displacement of `b`, mm.
 fn displacement_between(a: u32, b: u32) -> vec3<f32> {
     let plane = arrayLength(&remainder) / 3u;
     let ay = a + plane;
@@ -26,7 +26,7 @@ fn velocity_at(node: u32) -> vec3<f32> {
 #endif
 
 #if REFERENCE
-// Reference position of `a` less that of `b`, plus whole quanta `shift` along x and y, mm.
+// Reference position of `a` minus that of `b`, plus whole quanta `shift` along x and y, mm.
 fn lattice_between(a: u32, b: u32, shift: vec2<i32>) -> vec3<f32> {
     let plane = arrayLength(&reference) / 3u;
     let base = vec3<i32>(reference[b], reference[b + plane], reference[b + 2u * plane]);

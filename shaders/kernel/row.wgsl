@@ -1,4 +1,4 @@
-// The row of schedule data of one time step. Units: mm, s. The rate of F̄ is for periodic scenes.
+// The schedule data of one time step. Units: mm, s. The rate of F̄ exists only in periodic scenes.
 
 struct Row {
     gradient_xx: f32,

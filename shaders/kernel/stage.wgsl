@@ -1,4 +1,4 @@
-// The entry point of every stage: hands the items of the stage to its kernel. Workgroups fill a plane once a row of them is full.
+// The entry point of every stage: passes its items to the kernel. If one row of workgroups is not enough, they fill a plane.
 
 struct Items {
     first: u32,

@@ -1,4 +1,4 @@
-//! The arguments of the program.
+//! The command-line arguments of the program.
 
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -45,31 +45,31 @@ pub enum Command {
     Run {
         #[command(flatten)]
         case: CaseArguments,
-        /// Folder of the results [default: results/<name of the case>]
+        /// Results folder [default: results/<name of the case>]
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
-        /// Scalar type, instead of what the case says
+        /// Scalar type, overriding the case
         #[arg(long)]
         precision: Option<Scalar>,
-        /// Number of threads [default: all cores]; results do not depend on it
+        /// Number of threads [default: all cores]; it does not affect the results
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
         threads: Option<u16>,
-        /// What runs the scene; auto takes a discrete GPU if there is one
+        /// Machine that runs the scene; auto takes a discrete GPU if there is one
         #[arg(long, default_value = "auto")]
         backend: Machine,
         /// Part of the name of the adapter, for a machine with several (see `tricot devices`)
         #[arg(long, value_name = "NAME", default_value = "", hide_default_value = true)]
         adapter: String,
-        /// Use a folder that holds results: they are moved to DIR/previous-N
+        /// Use a folder that already holds results: they are moved to DIR/previous-N
         #[arg(long)]
         force: bool,
-        /// Go on from the last checkpoint in the folder of the results, to the same bits as without the stop
+        /// Resume from the last checkpoint in the results folder; the results have the same bits as without the stop
         #[arg(long, conflicts_with_all = ["force", "from"])]
         resume: bool,
         /// Start from a checkpoint that another run left at the end of a load step: DIR/state/STEP-N-NAME.state
         #[arg(long, value_name = "STATE")]
         from: Option<PathBuf>,
-        /// No progress bar
+        /// No progress display
         #[arg(short, long)]
         quiet: bool,
     },
@@ -80,7 +80,7 @@ pub enum Command {
         /// Folder of the mesh [default: results/<name of the case>-mesh]
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
-        /// Use a folder that holds results: they are moved to DIR/previous-N
+        /// Use a folder that already holds results: they are moved to DIR/previous-N
         #[arg(long)]
         force: bool,
     },
@@ -88,33 +88,33 @@ pub enum Command {
     Check {
         #[command(flatten)]
         case: CaseArguments,
-        /// Also print what called for each effect and what it costs, every stage of the algorithm, and the defaults in use
+        /// Also print the cause and cost of each effect, every stage of the algorithm, and the defaults in use
         #[arg(long)]
         explain: bool,
     },
     /// Print the JSON Schema of a case: every field, its meaning, unit, range and default.
     Schema {
-        /// That of a fabric file instead
+        /// Print the schema of a fabric file instead
         #[arg(long)]
         fabric: bool,
     },
     /// List the adapters that --backend gpu can use, with their limits.
     Devices,
-    /// Put the results of a run on one page of HTML that stands by itself.
+    /// Write the results of a run to one self-contained HTML page.
     Report {
         /// Folder of a run
         #[arg(value_name = "DIR")]
         source: PathBuf,
-        /// The page [default: report.html in the folder]
+        /// Output file [default: report.html in the folder]
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
     },
-    /// Say how the results of a run differ from those of another: curves, numbers, and what was run.
+    /// Compare two runs: curves, numbers, and input.
     Compare {
         /// Folder of a run
         #[arg(value_name = "A")]
         a: PathBuf,
-        /// Folder of the run that differences are relative to
+        /// Folder of the reference run for relative differences
         #[arg(value_name = "B")]
         b: PathBuf,
         /// Also write the numbers to a table
@@ -129,24 +129,24 @@ pub enum Command {
         #[command(subcommand)]
         study: StudyCommand,
     },
-    /// Draw a frame as PNG.
+    /// Draw a frame as a PNG.
     Picture {
         /// Folder of a run (its last frame is drawn), or a frame (.vtu)
         #[arg(value_name = "DIR_OR_FRAME")]
         source: PathBuf,
-        /// Frame of the folder: its number, or what stands behind the number in its name, as 25deg [default: the last one]
+        /// Frame of the folder: its number, or the part of its name after the number, such as 25deg [default: the last one]
         #[arg(long, value_name = "FRAME")]
         frame: Option<String>,
         /// Field that colours the surface, a vector with its component (NAME.x, .y, .z or .length) [default: the bodies]
         #[arg(long, value_name = "NAME")]
         field: Option<String>,
-        /// Values at both ends of the colours [default: those of the frame]
+        /// Values at both ends of the colour scale [default: the range of the frame]
         #[arg(long, value_name = "LOW,HIGH", value_parser = ends, allow_hyphen_values = true, requires = "field")]
         range: Option<[f64; 2]>,
         /// Width of the picture in pixels
         #[arg(long, default_value_t = 1600, value_parser = clap::value_parser!(u16).range(300..=6000))]
         width: u16,
-        /// The picture [default: picture.png in the folder, or beside the frame under its name]
+        /// Output file [default: picture.png in the folder, or next to the frame under its name]
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
     },
@@ -154,72 +154,72 @@ pub enum Command {
 
 #[derive(Subcommand)]
 pub enum StudyCommand {
-    /// Measure what accuracy costs in time: turn each numerical knob of a case, and compare with a much finer run.
+    /// Measure the cost of accuracy: vary each numerical parameter of a case, and compare with a much finer run.
     Accuracy {
         #[command(flatten)]
         case: CaseArguments,
         /// Folder of the study [default: results/<name of the case>-accuracy]
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
-        /// Only points with one of these words in their name, e.g. mesh,beams,f64
+        /// Run only points whose name contains one of these words, e.g. mesh,beams,f64
         #[arg(long, value_name = "WORDS", value_delimiter = ',')]
         points: Vec<String>,
-        /// What runs the points
+        /// Machine that runs the points
         #[arg(long, default_value = "auto")]
         backend: Machine,
         /// Number of threads [default: all cores]
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
         threads: Option<u16>,
-        /// No progress bar
+        /// No progress display
         #[arg(short, long)]
         quiet: bool,
     },
-    /// Run every case of a folder to its end, and say which do not show what their `expect` says.
+    /// Run every case of a folder to its end, and list those that do not meet their `expect`.
     Stability {
         /// Folder of cases
         #[arg(value_name = "FOLDER", default_value = "cases/hard")]
         folder: PathBuf,
-        /// What runs the scenes: cpu in f32 and f64, gpu, or auto for both as far as they are there
+        /// Machine that runs the scenes: cpu in f32 and f64, gpu, or auto for every machine available
         #[arg(long, default_value = "auto")]
         backend: Machine,
-        /// Leave every scene after so many steps, for a device in software [default: none]
+        /// Stop every scene after this many steps, for a software device [default: none]
         #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u64).range(1..))]
         longest: Option<u64>,
-        /// The table
+        /// Output table
         #[arg(short, long, value_name = "FILE", default_value = "results/stability.csv")]
         output: PathBuf,
     },
-    /// Turn each effect of a case off in turn: what it costs, and what it changes.
+    /// Turn off each effect of a case in turn: measure its cost and its influence.
     Effects {
         #[command(flatten)]
         case: CaseArguments,
         /// Turn off only this effect, by its name in `tricot check CASE`; may be repeated
         #[arg(long, value_name = "EFFECT")]
         only: Vec<String>,
-        /// Scalar type, instead of what the case says
+        /// Scalar type, overriding the case
         #[arg(long)]
         precision: Option<Scalar>,
         /// Number of threads [default: all cores]
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
         threads: Option<u16>,
-        /// What runs the scenes
+        /// Machine that runs the scenes
         #[arg(long, default_value = "auto")]
         backend: Machine,
-        /// The table [default: results/<name of the case>-effects.csv]; the runs go into the folder of this name without suffix
+        /// Output table [default: results/<name of the case>-effects.csv]; the runs go into the folder of this name without suffix
         #[arg(short, long, value_name = "FILE")]
         output: Option<PathBuf>,
-        /// Use a folder that holds runs: each is moved aside
+        /// Use a folder that already holds runs: each is moved aside
         #[arg(long)]
         force: bool,
     },
-    /// Measure the limit of the time step on the way through a case, in f64, beside the estimate that a run follows.
+    /// Measure the limit of the time step during a case, in f64, and compare it with the estimate that a run follows.
     Step {
         #[command(flatten)]
         case: CaseArguments,
-        /// Shear between two states, degrees; the end of every load step is one too
+        /// Shear between two states, degrees; the end of every load step is also a state
         #[arg(long, value_name = "DEGREES", default_value_t = 15.0)]
         every: f64,
-        /// Also try fixed steps at the end of the first load step, to find the longest that lasts
+        /// Also try fixed steps at the end of the first load step, to find the longest stable one
         #[arg(long)]
         confirm: bool,
     },
@@ -243,7 +243,7 @@ impl CaseArguments {
     }
 }
 
-/// Two numbers with a comma between them.
+/// Two numbers separated by a comma.
 fn ends(text: &str) -> std::result::Result<[f64; 2], String> {
     let numbers = text.split(',').map(|number| number.trim().parse().ok()).collect::<Option<Vec<f64>>>();
     numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| "give two numbers, as 0,0.4".into())

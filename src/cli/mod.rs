@@ -1,4 +1,4 @@
-//! What a command does: one library call each.
+//! Commands of the program: each makes one library call.
 
 pub mod arguments;
 
@@ -15,21 +15,21 @@ use tricot::study::effects::{self, effects};
 use tricot::study::stability::stability;
 use tricot::study::step::step;
 
-/// Exit codes beside those of errors.
+/// Exit codes in addition to those of errors.
 pub const UNEXPECTED: u8 = 1;
 pub const BAD_INPUT: u8 = 2;
 const INTERRUPTED: u8 = 130;
 
-/// What a command leaves for the terminal.
+/// Output of a command for the terminal.
 pub struct Done {
     pub text: String,
     pub code: u8,
 }
 
-/// Does what was asked for.
+/// Performs a command.
 ///
 /// # Errors
-/// As of the library call.
+/// The error of the library call.
 pub fn perform(command: Command) -> Result<Done> {
     let text = match command {
         Command::Run { case, output, precision, threads, backend, adapter, force, resume, from, quiet } => {
@@ -104,7 +104,7 @@ pub fn perform(command: Command) -> Result<Done> {
     Ok(Done { text, code: 0 })
 }
 
-/// The default folder of results of a case, with something behind its name.
+/// The default results folder of a case, with a suffix.
 fn beside(case: &Path, what: &str) -> PathBuf {
     let mut dir = directory::default(case).into_os_string();
     dir.push(what);

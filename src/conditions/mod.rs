@@ -1,3 +1,3 @@
-//! Conditions on nodes of free scenes.
+//! Prescribed motion of nodes in free scenes.
 
 pub mod prescribed;

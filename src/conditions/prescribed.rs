@@ -18,12 +18,12 @@ pub struct Params {
     pub first_thread: u32,
 }
 
-/// Node and mask of components (bit k for component k), 2 numbers a condition.
+/// Node and mask of components (bit k for component k), 2 numbers per condition.
 const NODES: Slot = Slot::read("nodes", Uint);
 
-/// Replaces accelerations of prescribed components, before fibre lines see them; `DAMPING` as for the integration.
+/// Replaces the accelerations of prescribed components before the fibre lines use them; `DAMPING` as for the integration.
 pub struct Prescribed<const DAMPING: bool>;
-/// Takes back what fibre lines did to prescribed components.
+/// Undoes the change of prescribed components by the fibre lines.
 pub struct Hold;
 
 impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
@@ -40,9 +40,9 @@ impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
         Slot::read("mass", Scalar),
         Slot::scatter("acceleration", Scalar),
         Slot::scatter("inverse_mass", Scalar),
-        // of the reaction, mJ
+        // work of the reaction, mJ
         Slot::row("work", Scalar, 1),
-        // force that the scene exerts on the prescribed components, N, weight included
+        // force of the scene on the prescribed components, N, including weight
         Slot::row("reactions", Scalar, 3),
     ];
 
@@ -72,7 +72,7 @@ impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
                 let a = (target - v * keep) / gain;
                 acceleration.set(place, a);
                 let mean = (v + target) * L::Scalar::from_f64(0.5);
-                // a node that is held altogether carries no added mass
+                // a fully prescribed node carries no added mass
                 let inertia = if mask == 7 { mass[node] } else { L::Scalar::from_f64(1.0) / inverse.get(node) };
                 let reaction = inertia * a - force;
                 let work = works.at(0, item);

@@ -1,13 +1,13 @@
-//! Where a thread is in contact with other threads: a line through its nodes, moved out to the mean of the arcs that its beams
-//! stand for.
+//! The contact line of a thread against other threads: a line through its nodes, offset to the mean of the arcs that its beams
+//! represent.
 //!
-//! A chain of chords that touches a thread inside its bend with the middle of each is a polygon around it: one of angle θ a
-//! chord is θ²/12 longer than the arc. The arc of a chord of length l lies κl²/12 outside of it in the mean, with κ its
-//! curvature. A node between chords of lengths l₁ and l₂ is moved out by κ (l₁² − l₁l₂ + l₂²)/12: weighted with the lengths, that
-//! is the same in the mean, so that the line is as long as the arc to second order, whatever the lengths. With κ from the
-//! directions of both chords, the shift is a weighted second difference of positions, for equal lengths a twelfth of it. The ends of
-//! a thread stay. Pieces of a line share their ends, so the line is joined, and each hangs on four nodes by weights that are
-//! constant: forces on these nodes are the exact gradient of the energy.
+//! A chain of chords that touches the thread inside its bend with the middle of each chord is a polygon around it: with the
+//! angle θ per chord it is θ²/12 longer than the arc. The arc of a chord of length l lies κl²/12 outside the chord in the mean,
+//! with κ its curvature. A node between chords of lengths l₁ and l₂ is offset by κ (l₁² − l₁l₂ + l₂²)/12. Weighted with the
+//! lengths, this has the same mean, so the line is as long as the arc to second order for any lengths. With κ from the
+//! directions of both chords, the offset is a weighted second difference of positions (for equal lengths a twelfth of it). The
+//! ends of a thread are not offset. Pieces of a line share their ends, so the line is continuous, and each piece depends on
+//! four nodes with constant weights: the forces on these nodes are the exact gradient of the energy.
 
 use crate::elements::beam2;
 use crate::kernel::interface::{Constant, constants};
@@ -15,38 +15,38 @@ use crate::kernel::lane::Real;
 use crate::kernel::node::Displacements;
 use crate::kernel::vector::{Vector, add, scale, sub};
 
-/// Integers of a beam in the table: the beams before and behind it on its thread, itself where there is none; its thread; and the
+/// Integers per beam in the table: the previous and next beams on its thread, or itself if there is none; its thread; and the
 /// image, in periods along x and y, in which the first beam of a closed thread follows the last.
 pub const NEIGHBOURS: usize = 5;
-/// Numbers of a beam in the table: shares of the vectors before and behind its first node in the shift of that node, and of those
-/// before and behind its second node in the shift of that one, zero at the end of a thread; arc length of its middle, mm; its
-/// length, mm; the length of a closed thread, mm, else 0.
+/// Numbers per beam in the table: shares of the previous and next vectors in the offset of its first node, and in the offset of
+/// its second node, zero at the end of a thread; arc length at its middle, mm; its length, mm; the length of a closed thread,
+/// mm, else 0.
 pub const SHARES: usize = 7;
-/// Where the arc length is.
+/// Index of the arc length.
 pub const ARC: usize = 4;
-/// What twins know of both.
+/// Constants shared with the twins.
 pub const CONSTANTS: [Constant; 3] = constants![uint: NEIGHBOURS, SHARES, ARC];
 
-/// Tables of the beams before and behind.
+/// Tables of the previous and next beams.
 pub struct OffsetLines<'a, R> {
     pub neighbours: &'a [u32],
     pub shares: &'a [R],
 }
 
-/// A piece of the line: from the first node of its beam to both its ends, in the reference and now, mm.
+/// A piece of the line: vectors from the first node of its beam to both its ends, in the reference and current states, mm.
 pub struct Piece<R> {
     pub rest: [Vector<R>; 2],
     pub now: [Vector<R>; 2],
 }
 
-/// Shares of the vectors before and behind a node in its shift, from their lengths, mm.
+/// Shares of the previous and next vectors in the offset of a node, from their lengths, mm.
 pub fn shares(before: f64, behind: f64) -> [f64; 2] {
     let rise = (before * before - before * behind + behind * behind) / (6.0 * (before + behind));
     [rise / before, rise / behind]
 }
 
 impl<R: Real> OffsetLines<'_, R> {
-    /// The beams before and behind, and the four shares.
+    /// The previous and next beams, and the four shares.
     #[inline(always)]
     fn beside(&self, beam: usize) -> ([usize; 2], [R; 4]) {
         let (n, s) = (&self.neighbours[NEIGHBOURS * beam..][..NEIGHBOURS], &self.shares[SHARES * beam..][..SHARES]);
@@ -75,7 +75,7 @@ impl<R: Real> OffsetLines<'_, R> {
         Piece { rest, now: [add(rest[0], change[0]), add(rest[1], change[1])] }
     }
 
-    /// The four nodes on which a piece hangs.
+    /// The four nodes that carry a piece.
     #[inline(always)]
     pub fn nodes(&self, ends: &[u32], beam: usize) -> [usize; 4] {
         let [before, behind] = self.beside(beam).0;
@@ -90,7 +90,7 @@ impl<R: Real> OffsetLines<'_, R> {
         [[-before, one + before + first, -first, zero], [zero, -second, one + second + behind, -behind]]
     }
 
-    /// The largest sum of the sizes of these weights.
+    /// The largest sum of the absolute values of these weights.
     #[inline(always)]
     pub fn most_weights(&self, beam: usize) -> R {
         let [before, first, second, behind] = self.beside(beam).1;
@@ -98,7 +98,8 @@ impl<R: Real> OffsetLines<'_, R> {
         R::from_f64(1.0) + largest + largest
     }
 
-    /// Whether two beams, the second in an image, are the same thread here, and closer along it than `arc` (mm) from end to end.
+    /// Whether two beams, the second in an image, belong to the same thread here, with a distance along it below `arc` (mm)
+    /// from end to end.
     #[inline(always)]
     pub fn are_near(&self, a: usize, b: usize, image: [i32; 2], arc: R) -> bool {
         let of = |beam: usize| &self.neighbours[NEIGHBOURS * beam..][..NEIGHBOURS];
@@ -112,7 +113,7 @@ impl<R: Real> OffsetLines<'_, R> {
         chain[2] == of(b)[2] && (after(0) || after(1) || after(-1))
     }
 
-    /// The beam before another one in an image, and its image; `None` at the start of a thread.
+    /// The beam before another beam in an image, and its image; `None` at the start of a thread.
     #[inline(always)]
     pub fn before(&self, beam: usize, image: [i32; 2]) -> Option<(usize, [i32; 2])> {
         let chain = &self.neighbours[NEIGHBOURS * beam..][..NEIGHBOURS];

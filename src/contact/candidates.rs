@@ -1,8 +1,9 @@
-//! The faces near what carries contact points: every face of another body whose box lies within reach of the box of the points.
+//! Broad-phase candidates: for each carrier of contact points, the faces of other bodies whose box lies within reach of the box
+//! of its points.
 //!
-//! A list is sorted by body and lateral image, then by face, so that it does not depend on the order in which the grid lists its
-//! items, and a body's faces follow each other. It holds no state but how often it was made: what touches is known by its body.
-//! Carriers near nothing that has moved relative to them (see [`super::skin`]) keep their lists.
+//! A list is sorted by body and lateral image, then by face, so it is independent of the order of items in the grid, and the
+//! faces of a body are consecutive. The list holds no state except the number of times it was made: contact state is stored per
+//! body. Carriers keep their lists if nothing near them has moved relative to them (see [`super::skin`]).
 
 use super::grid::{BOX, Moved, SLAB, absolute, cell_index, cells, has_moved, inverse, motion, pull_back, stretch};
 use super::surface::{self, CARRIED, POINT, Surface, entry, of_coded};
@@ -18,12 +19,12 @@ use crate::kernel::vector::Vector;
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
-/// Integers of a carrier: its first point, how many it has, and its own body, or [`EMPTY`] for a thread.
+/// Integers per carrier: its first point, number of points, and its own body, or [`EMPTY`] for a thread.
 pub const CARRIER: usize = 3;
-/// Integers before the entries of a list, and before the keys of the bodies that a point touches: how often the list was made, and
-/// how often it had been when the point last looked.
+/// Integers before the entries of a list, and before the keys of the bodies that a point touches: how often the list was made,
+/// and how often it had been made when the point last read it.
 pub const MADE: usize = 1;
-/// What twins know of lists and carriers.
+/// Constants of lists and carriers shared with the twins.
 pub const CONSTANTS: [Constant; 2] = constants![uint: CARRIER, MADE];
 
 const SLOTS: [Slot; 15] = [
@@ -38,7 +39,7 @@ const SLOTS: [Slot; 15] = [
     Slot::read("counts", Uint),
     Slot::read("lists", Uint),
     Slot::read("boxes", Scalar),
-    // displacements when everything was last searched, in quanta
+    // displacements at the last full search, in quanta
     Slot::read("before", Int),
     Slot::row_of_plan("near", Uint),
     // see [`found`]
@@ -49,7 +50,7 @@ const SLOTS: [Slot; 15] = [
 /// The search, for beams of threads (`THREAD`) or for nodes of yarn surfaces.
 pub struct Candidates<const THREAD: bool, const PERIODIC: bool>;
 
-/// Bounds that tell how far the nodes of a carrier have moved since everything was searched, quanta.
+/// Bounds of the motion of a carrier's nodes since the last full search, quanta.
 #[inline(always)]
 fn moved<K: Kernel, R: Real, const N: usize>(io: &Io<R>, coded: [u32; N]) -> ([R; 3], [R; 3]) {
     let mut moved = Moved::none();
@@ -57,12 +58,12 @@ fn moved<K: Kernel, R: Real, const N: usize>(io: &Io<R>, coded: [u32; N]) -> ([R
     moved.bounds()
 }
 
-/// Where the points of a carrier are.
+/// The extent of the points of a carrier.
 struct Place<R> {
-    /// Lowest and highest from the carrier's first node, mm.
+    /// Lowest and highest coordinates relative to the carrier's first node, mm.
     low: Vector<R>,
     high: Vector<R>,
-    /// Middle and half sizes in the pulled-back plane, mm, and lowest and highest z, mm.
+    /// Centre and half sizes in the pulled-back plane, mm, and lowest and highest z, mm.
     middle: [R; 2],
     half: [R; 2],
     heights: [R; 2],
@@ -94,7 +95,7 @@ impl<R: Real> Place<R> {
         }
     }
 
-    /// The image of a slab, by its box, that is within `reach` (mm), if any; `stretch` turns distances into those of the plane.
+    /// The image of a slab whose box is within `reach` (mm), if any; `stretch` converts distances to the pulled-back plane.
     #[inline(always)]
     fn image_within(&self, bounds: &[R], reach: R, stretch: [R; 2], period: [R; 2]) -> Option<[i32; 2]> {
         if self.heights[1] < bounds[2] - reach || self.heights[0] > bounds[3] + reach {
@@ -115,7 +116,7 @@ impl<R: Real> Place<R> {
         Some(image)
     }
 
-    /// Whether the box of a face, whose corners are seen from the same node, is within `reach`, mm.
+    /// Whether the box of a face, with corners relative to the same node, is within `reach`, mm.
     #[inline(always)]
     fn is_near(&self, corners: &[Vector<R>; 4], reach: R) -> bool {
         let mut square = R::from_f64(0.0);
@@ -129,7 +130,7 @@ impl<R: Real> Place<R> {
     }
 }
 
-/// The list of a carrier: entries in the order of their bodies.
+/// The list of a carrier: entries ordered by body.
 struct List<'a, R, const PERIODIC: bool> {
     entries: &'a mut [u32],
     count: usize,
@@ -145,7 +146,7 @@ impl<R: Real, const PERIODIC: bool> List<'_, R, PERIODIC> {
         self.surface.body(face, image)
     }
 
-    /// Adds an entry that is not yet there.
+    /// Adds an entry if it is not yet in the list.
     #[inline(always)]
     fn add(&mut self, entry: u32) {
         let body = self.body(entry);
@@ -163,7 +164,7 @@ impl<R: Real, const PERIODIC: bool> List<'_, R, PERIODIC> {
         self.count += 1;
     }
 
-    /// Bodies in the list.
+    /// Number of bodies in the list.
     #[inline(always)]
     fn bodies(&self) -> usize {
         let (mut bodies, mut last) = (0, EMPTY);
@@ -198,7 +199,7 @@ impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PER
     }
 }
 
-/// Lists of carriers with `N` nodes.
+/// Makes the lists of carriers with `N` nodes.
 #[inline(always)]
 fn run<K: Kernel, R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, items: Range<usize>) {
     let params: Params = io.params();
@@ -240,11 +241,11 @@ fn run<K: Kernel, R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, ite
         };
         let ((x0, x1), (y0, y1)) = (range(0), range(1));
         let cells = (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| cell_index(&params, x, y)));
-        // overflow is searched again with larger tables
+        // an overflow triggers a new search with larger tables
         if cells.clone().any(|cell| counts[cell] > params.capacity) {
             continue;
         }
-        // slabs of other bodies in reach, and their images
+        // slabs of other bodies within reach, and their images
         let seen = cells.flat_map(|cell| &lists[cell * params.capacity as usize..][..counts[cell] as usize]);
         let seen = seen.filter(|near| **near < params.slabs).filter_map(|near| {
             let slab = &slabs[SLAB * *near as usize..][..SLAB];

@@ -1,9 +1,9 @@
-//! A face of a yarn's surface, seen from a point that may touch it: a bilinear quadrilateral, its edges and its corners.
+//! A face of a yarn's surface, seen from a contact point: a bilinear quadrilateral, its edges and its corners.
 
 use crate::kernel::lane::Real;
 use crate::kernel::vector::{Vector, add, cross, dot, fma, norm, scale, sub};
 
-/// Middle and derivatives of a bilinear face.
+/// Centre and derivatives of a bilinear face.
 #[derive(Clone, Copy)]
 pub struct Patch<R> {
     middle: Vector<R>,
@@ -27,7 +27,7 @@ impl<R: Real> Patch<R> {
         }
     }
 
-    /// No point of the face is nearer to the origin than this, mm; negative if some may be anywhere.
+    /// Lower bound of the distance of the face from the origin, mm; negative if there is no bound.
     #[inline(always)]
     pub fn nearest(&self) -> R {
         let (a, b) = (add(self.along, self.across), sub(self.along, self.across));
@@ -45,8 +45,8 @@ impl<R: Real> Patch<R> {
         (fma(self.twist, eta, self.along), fma(self.twist, xi, self.across))
     }
 
-    /// Coordinates of the point of the unbounded patch that is closest to the origin, kept within ±2, by Newton's method. Where
-    /// the patch is so warped that the distance is not convex, the warp is left out of its second derivative.
+    /// Closest-point projection of the origin onto the unbounded patch by Newton's method, with coordinates limited to ±2.
+    /// Where the patch is so warped that the distance is not convex, the warp is omitted from its second derivative.
     #[inline(always)]
     fn project(&self) -> (R, R) {
         let (zero, two) = (R::from_f64(0.0), R::from_f64(2.0));
@@ -76,12 +76,12 @@ impl<R: Real> Patch<R> {
 pub struct Closest<R> {
     /// Weights of the four corners.
     pub weights: [R; 4],
-    /// Unit vector from it to the origin.
+    /// Unit vector from this point to the origin.
     pub away: Vector<R>,
     pub distance: R,
-    /// Height of the origin above the plane that touches the face there, mm.
+    /// Height of the origin above the tangent plane of the face at this point, mm.
     pub height: R,
-    /// Whether it lies inside the face rather than on its border.
+    /// Whether it lies inside the face, not on its border.
     pub interior: bool,
 }
 
@@ -89,7 +89,7 @@ pub struct Closest<R> {
 #[derive(Clone, Copy)]
 pub struct OnEdge<R> {
     pub weights: [R; 4],
-    /// From it to the origin, mm, and the square of the distance.
+    /// Vector from this point to the origin, mm, and the squared distance.
     pub offset: Vector<R>,
     pub square: R,
 }
@@ -116,7 +116,7 @@ pub fn on_corner<R: Real>(q: &[Vector<R>; 4], a: usize) -> OnEdge<R> {
     OnEdge { weights, offset, square: dot(offset, offset) }
 }
 
-/// The closest point of a face: where the origin projects into it, else on the nearest of its edges.
+/// The closest point of a face: the projection of the origin if it lies inside, else the closest point of the nearest edge.
 #[inline(always)]
 pub fn closest<R: Real>(q: &[Vector<R>; 4], p: &Patch<R>) -> Closest<R> {
     let (zero, one, quarter) = (R::from_f64(0.0), R::from_f64(1.0), R::from_f64(0.25));

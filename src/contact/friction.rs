@@ -1,10 +1,10 @@
-//! Coulomb friction with true stick: an elastic tangential displacement t that is carried along, turned into the tangent
-//! plane, and cut where its force would exceed μ times the normal force. A pair at rest keeps its force for ever; nothing creeps.
+//! Coulomb friction with true stick: an elastic tangential displacement t is accumulated, rotated into the tangent plane, and
+//! limited where its force would exceed μ times the normal force. A pair at rest keeps its force indefinitely, without creep.
 
 use crate::kernel::lane::Real;
 use crate::kernel::vector::{Vector, add, dot, fma, scale, sub};
 
-/// What one step of sliding leaves.
+/// Result of one friction step.
 pub struct Slide<R> {
     /// Elastic tangential displacement, mm; the force is −k_t t.
     pub elastic: Vector<R>,
@@ -26,7 +26,7 @@ pub fn slide<R: Real>(elastic: Vector<R>, motion: Vector<R>, normal: Vector<R>, 
     let half = R::from_f64(0.5) * stiffness;
     let new = if held > limit { scale(trial, limit / held) } else { trial };
     let gone = sub(trial, new);
-    // work over the step with the mean of the force before and after, less what is stored
+    // work over the step with the mean of the old and new forces, minus the stored energy
     let lost = (dot(elastic, elastic) - dot(turned, turned)) + dot(add(turned, new), gone);
     Slide { elastic: new, slip: dot(gone, gone).sqrt(), dissipated: half * lost }
 }

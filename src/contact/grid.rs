@@ -1,9 +1,8 @@
-//! The grid of the contact search: slabs of yarns (some neighbouring faces) and beams, each in every cell
-//! that its box touches.
+//! The grid of the broad phase: slabs of yarns (some neighbouring faces) and beams, each in every cell that its box touches.
 //!
-//! Cells are taken in the pulled-back plane F̄⁻¹x, where the periodic cell keeps its rectangle; a distance ρ in space is at
-//! most ρ |row of F̄⁻¹| along an axis there. A cell lists its items in any order: what is chosen from them does not depend on it.
-//! Boxes tell how far their items have moved since everything was last searched (see [`super::skin`]).
+//! Cells lie in the pulled-back plane F̄⁻¹x, in which the periodic cell remains a rectangle; a distance ρ in space is there at
+//! most ρ |row of F̄⁻¹| along an axis. A cell lists its items in any order, and the candidates chosen from them are independent
+//! of it. Boxes store the motion of their items since the last full search (see [`super::skin`]).
 
 use super::arc_offset::{self, OffsetLines};
 use super::surface::{self, FACE, Surface, of_coded};
@@ -19,26 +18,26 @@ use crate::kernel::stage::{Io, Kernel, Own, Scatter};
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Numbers of an item's box: middle in the pulled-back plane, mm (2), lowest and highest z, mm, half sizes in the plane, mm (2);
-/// then, see [`MOTION`], least (3) and greatest motion (3) of its nodes since everything was searched, quanta.
+/// Numbers per item box: centre in the pulled-back plane, mm (2), lowest and highest z, mm, half sizes in the plane, mm (2);
+/// then, see [`MOTION`], least (3) and greatest motion (3) of its nodes since the last full search, quanta.
 pub const BOX: usize = 12;
-/// Where motion starts in a box.
+/// Index of the motion in a box.
 pub const MOTION: usize = 6;
-/// Largest motion that a box tells of, quanta: 2 mm, which are whole numbers in f32.
+/// Largest motion that a box can store, quanta: 2 mm, a whole number in f32.
 const MOST_MOTION: i32 = 1 << 24;
-/// Integers of a slab: its first face, and how many follow each other.
+/// Integers per slab: its first face, and the number of consecutive faces.
 pub const SLAB: usize = 2;
-/// Faces of a slab at most.
+/// Largest number of faces per slab.
 pub const SLAB_FACES: usize = 8;
-/// More than rounding moves a place in the plane, mm: an item must not be in too few cells.
+/// Upper bound of the rounding error of a position in the plane, mm: an item must not be missing from a cell.
 const ROUNDING: f64 = 1e-4;
-/// What twins know of the grid.
+/// Constants of the grid shared with the twins.
 pub const CONSTANTS: [Constant; 5] = constants![uint: BOX, MOTION, SLAB; int: MOST_MOTION; scalar: ROUNDING];
 
-/// Where nodes are: what fills the grid reads it first.
+/// Node positions, the first slots of the stages that fill the grid.
 const PLACE: [Slot; 3] = [Slot::read("reference", Int), Slot::read("quanta", Int), Slot::read("remainder", Scalar)];
 
-/// What fills the grid writes.
+/// Slots written by the stages that fill the grid.
 const GRID: [Slot; 4] = [
     Slot::atomic("counts", Uint),
     Slot::scatter("lists", Uint),
@@ -48,7 +47,7 @@ const GRID: [Slot; 4] = [
 
 /// Empties the cells.
 pub struct Clear;
-/// What the twins of both that fill it take from Rust.
+/// Constants shared with the twins of both stages that fill the grid.
 const CONSTANTS_OF_FILLS: &[&[Constant]] = &[
     &position::CONSTANTS,
     &beam2::CONSTANTS,
@@ -89,7 +88,7 @@ pub fn inverse<R: Real, const PERIODIC: bool>(gradient: &[[R; 3]; 3]) -> [[R; 2]
     [[d * scale, -(b * scale)], [-(c * scale), a * scale]]
 }
 
-/// How much longer a distance in space can be in the pulled-back plane, along its axes.
+/// Factor by which a distance in space can grow in the pulled-back plane, along its axes.
 #[inline(always)]
 pub fn stretch<R: Real>(inverse: &[[R; 2]; 2]) -> [R; 2] {
     [0, 1].map(|k| (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt())
@@ -101,7 +100,7 @@ pub fn pull_back<R: Real>(inverse: &[[R; 2]; 2], v: [R; 3]) -> [R; 2] {
     [inverse[0][0] * v[0] + inverse[0][1] * v[1], inverse[1][0] * v[0] + inverse[1][1] * v[1]]
 }
 
-/// Where a node is: pulled-back plane and height, mm. For the grid only; contact works with differences.
+/// Node position: pulled-back plane and height, mm. For the grid only; contact uses position differences.
 #[inline(always)]
 pub fn absolute<K: Kernel, R: Real>(io: &Io<R>, inverse: &[[R; 2]; 2], node: usize) -> ([R; 2], R) {
     let reference = io.ints(slot!(K::SLOTS, "reference"));
@@ -114,7 +113,7 @@ pub fn absolute<K: Kernel, R: Real>(io: &Io<R>, inverse: &[[R; 2]; 2], node: usi
     ([mm(reference[node]) + back[0], mm(reference[node + plane]) + back[1]], mm(reference[node + 2 * plane]) + w[2])
 }
 
-/// First and last cell along one axis for an interval of the pulled-back plane; the last may lie behind the first by whole periods.
+/// First and last cell along one axis for an interval of the pulled-back plane; the last may exceed the first by whole periods.
 #[inline(always)]
 pub fn cells<R: Real, const PERIODIC: bool>(params: &Params, axis: usize, low: R, high: R) -> (i32, i32) {
     let real = |x: f32| R::from_f64(f64::from(x));
@@ -131,14 +130,14 @@ pub fn cells<R: Real, const PERIODIC: bool>(params: &Params, axis: usize, low: R
     }
 }
 
-/// Number of a cell.
+/// Index of a cell.
 #[inline(always)]
 pub fn cell_index(params: &Params, x: i32, y: i32) -> usize {
     let (nx, ny) = (params.cells[0] as i32, params.cells[1] as i32);
     (y.rem_euclid(ny) * nx + x.rem_euclid(nx)) as usize
 }
 
-/// Displacement of a node since everything was searched, quanta: the kernel binds that of then as `before`.
+/// Displacement of a node since the last full search, quanta: the kernel binds the displacement at that search as `before`.
 #[inline(always)]
 pub fn motion<K: Kernel, R: Real>(io: &Io<R>, node: usize) -> [i32; 3] {
     let (quanta, remainder) = (io.ints(slot!(K::SLOTS, "quanta")), io.scalars(slot!(K::SLOTS, "remainder")));
@@ -152,8 +151,8 @@ pub fn motion<K: Kernel, R: Real>(io: &Io<R>, node: usize) -> [i32; 3] {
     [along(0), along(1), along(2)]
 }
 
-/// Whether an item, by its box, has moved by more than `apart` relative to something that has moved between `low` and `high`, or
-/// either by more than is told of.
+/// Whether an item, by its box, has moved by more than `apart` relative to an item with motion between `low` and `high`, or
+/// whether either motion exceeds the range of a box.
 #[inline(always)]
 pub fn has_moved<R: Real>(bounds: &[R], low: [R; 3], high: [R; 3], apart: R) -> bool {
     let most = R::from_i32(MOST_MOTION);
@@ -166,7 +165,7 @@ pub fn has_moved<R: Real>(bounds: &[R], low: [R; 3], high: [R; 3], apart: R) -> 
     beyond(0) || beyond(1) || beyond(2)
 }
 
-/// Least and greatest motion of some nodes, quanta.
+/// Bounds of the motion of some nodes, quanta.
 pub struct Moved {
     least: [i32; 3],
     greatest: [i32; 3],
@@ -179,7 +178,7 @@ impl Moved {
         Self { least: [MOST_MOTION; 3], greatest: [-MOST_MOTION; 3] }
     }
 
-    /// With a node that has moved.
+    /// Includes a node.
     #[inline(always)]
     pub fn add(&mut self, motion: [i32; 3]) {
         for (k, along) in motion.into_iter().enumerate() {
@@ -188,14 +187,14 @@ impl Moved {
         }
     }
 
-    /// As numbers of a box.
+    /// The bounds as numbers of a box.
     #[inline(always)]
     pub fn bounds<R: Real>(&self) -> ([R; 3], [R; 3]) {
         ([0, 1, 2].map(|k| R::from_i32(self.least[k])), [0, 1, 2].map(|k| R::from_i32(self.greatest[k])))
     }
 }
 
-/// The box of an item in the pulled-back plane and in height, from its first node, mm, and the motion of its nodes.
+/// The box of an item in the pulled-back plane and in height, relative to its first node, mm, and the motion of its nodes.
 struct Bounds<R> {
     low: [R; 3],
     high: [R; 3],
@@ -203,14 +202,14 @@ struct Bounds<R> {
 }
 
 impl<R: Real> Bounds<R> {
-    /// The first node alone.
+    /// The box of the first node alone.
     #[inline(always)]
     fn new() -> Self {
         let zero = [R::from_f64(0.0); 3];
         Self { low: zero, high: zero, moved: Moved::none() }
     }
 
-    /// With the end of a vector from the first node.
+    /// Includes the end of a vector from the first node.
     #[inline(always)]
     fn grow(&mut self, inverse: &[[R; 2]; 2], v: [R; 3]) {
         let back = pull_back(inverse, v);
@@ -221,7 +220,7 @@ impl<R: Real> Bounds<R> {
     }
 }
 
-/// Where the grid's items go.
+/// The grid during filling.
 struct Grid<'a, R> {
     params: Params,
     inverse: [[R; 2]; 2],

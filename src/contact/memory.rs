@@ -1,15 +1,15 @@
-//! What contact with faces remembers of a point from step to step: gaps to listed faces, touched bodies, and the touch of each.
+//! Contact state of a point against faces between steps: gaps to listed faces, touched bodies, and the touch of each.
 
 use super::EMPTY;
 use crate::kernel::lane::Real;
 
-/// Numbers before the gaps of a point, mm: the least gap when faces were last looked at; what bodies can have closed of it
-/// since; how deep the point was inside a body, or may have been. Then the gap of every face of the list.
+/// Numbers before the gaps of a point, mm: the least gap at the last evaluation of faces; the largest possible closure since
+/// then; the penetration, or an upper bound of it. Then the gap of every face of the list.
 pub const LEAST: usize = 0;
 pub const CLOSED: usize = 1;
 pub const INNER: usize = 2;
 pub const GAPS: usize = 3;
-/// Numbers of a touch: normal force and its part from damping, N; with friction then the elastic tangential displacement, mm (3).
+/// Numbers per touch: normal force and its damping part, N; with friction also the elastic tangential displacement, mm (3).
 pub const NORMAL: usize = 0;
 pub const DAMPED: usize = 1;
 pub const ELASTIC: usize = 2;
@@ -17,7 +17,7 @@ pub const fn touch(friction: bool) -> usize {
     if friction { ELASTIC + 3 } else { ELASTIC }
 }
 
-/// What stays of a point from step to step, and its sums.
+/// State of a point that persists between steps, and its sums.
 pub(super) struct Kept<'a, R> {
     pub gaps: &'a mut [R],
     pub keys: &'a mut [u32],
@@ -26,8 +26,8 @@ pub(super) struct Kept<'a, R> {
 }
 
 impl<R: Real> Kept<'_, R> {
-    /// With a new list all faces are looked at. How deep the point was inside stays known; before the first one it may be anywhere up
-    /// to `depth` (mm).
+    /// A new list resets all gaps, so that all faces are evaluated. The penetration is kept; before the first list it may be
+    /// anything up to `depth` (mm).
     #[inline(always)]
     pub fn renew(&mut self, made: u32, depth: R) {
         if self.keys[0] != made {

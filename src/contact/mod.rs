@@ -1,12 +1,14 @@
 //! Contact: points of threads and nodes of yarn surfaces against the surfaces of yarns, and beams against beams.
 //!
-//! A scene has the kinds of pairs that it calls for, each with stages of its own, and friction only if something rubs.
+//! A scene has only the kinds of pairs that it requires, each with its own stages, and friction only if it is on, the
+//! coefficient is positive and bodies can touch.
 //!
-//! Yarns have a closed `surface` of `face`s. `grid` sorts slabs of faces and beams into cells, `candidates` lists the faces near each
-//! beam and each node of a yarn, and every step `penalty` adds the forces of the listed faces, the gradient of a `potential`, on the
-//! points that these carry, which `arc` lays along beams. For beams on beams, `pairs` finds who is near, and `threads` adds the
-//! forces: `arc_offset` lays the lines of threads, and `segments` integrates along them. Forces and contact stiffness are added as
-//! integers, so their sum does not depend on the order, and the forces of a pair cancel exactly.
+//! Yarns have a closed `surface` of `face`s. Broad phase: `grid` sorts slabs of faces and beams into cells, and `candidates`
+//! lists the faces near each beam and each yarn node. Narrow phase: every step `penalty` applies the forces of the listed
+//! faces, the gradient of a `potential`, to the contact points, which `arc` places along beams. For beams on beams, `pairs`
+//! finds nearby beams, and `threads` applies the forces: `arc_offset` constructs the lines of threads, and `segments`
+//! integrates along them. Forces and contact stiffness are summed as integers, so the sum is independent of the order, and the
+//! forces of a pair cancel exactly.
 
 pub mod arc;
 pub mod arc_offset;
@@ -41,27 +43,27 @@ pub struct Params {
     pub cells: [u32; 2],
     /// Items that a cell can hold.
     pub capacity: u32,
-    /// Faces in the list of a carrier of contact points, and the bodies that a point can touch.
+    /// Capacity of a carrier's list of faces, and number of bodies that a point can touch.
     pub faces: u32,
     pub slots: u32,
-    /// Slots of a beam.
+    /// Slots per beam.
     pub beam_slots: u32,
-    /// Slabs of yarns among the grid's items; beams come after them.
+    /// Number of yarn slabs among the grid's items; beams follow them.
     pub slabs: u32,
-    /// Numbers that a slot of a beam keeps, see [`slot_state`].
+    /// Numbers stored per slot of a beam, see [`slot_state`].
     pub state: u32,
-    /// Low corner of the grid and size of its cells, mm.
+    /// Lower corner of the grid and size of its cells, mm.
     pub origin: [f32; 2],
     pub cell: [f32; 2],
-    /// Distance beyond touching at which pairs become candidates, mm.
+    /// Contact skin (Verlet skin): distance beyond touching at which pairs become candidates, mm.
     pub skin: f32,
     /// Friction coefficient.
     pub friction: f32,
-    /// Tangential over normal penalty.
+    /// Ratio of tangential to normal penalty.
     pub tangential: f32,
-    /// Share of critical damping.
+    /// Damping ratio: share of critical damping.
     pub damping: f32,
-    /// Size of a unit of force, N, and of stiffness, N/mm.
+    /// Quantum of force, N, and of stiffness, N/mm.
     pub force_quantum: f32,
     pub stiffness_quantum: f32,
     /// Radius of threads, mm.
@@ -70,26 +72,26 @@ pub struct Params {
     pub thread_thread: f32,
     /// Arc length within which beams of one thread ignore each other, mm.
     pub self_arc: f32,
-    /// Deepest penetration of a surface node that is still pushed out, mm.
+    /// Largest penetration of a surface node that is still pushed out, mm.
     pub depth: f32,
-    /// How far bodies may have moved along an axis relative to each other before candidates are searched again, quanta.
+    /// Relative motion of bodies along an axis that triggers a new candidate search, quanta.
     pub apart: u32,
 }
 
-/// Numbers of a slot of a beam: normal force, N, or less what is sure to be left of the gap, mm; with friction then the elastic tangential
-/// displacement, mm (3).
+/// Numbers per slot of a beam: normal force, N, or minus the guaranteed remaining gap, mm; with friction also the elastic
+/// tangential displacement, mm (3).
 pub const fn slot_state(friction: bool) -> usize {
     if friction { 4 } else { 1 }
 }
 
-/// What a carrier or a beam notes of its candidates: found when everything was last searched, or since, or still to be found.
+/// State of the candidates of a carrier or beam: from the last full search, from a later partial search, or never searched.
 pub mod found {
     pub const WITH_ALL: u32 = 0;
     pub const SINCE: u32 = 1;
     pub const NEVER: u32 = 2;
 }
 
-/// What twins know of candidates and sums.
+/// Constants of candidates and sums shared with the twins.
 pub const CONSTANTS: [Constant; 5] = constants![uint: WITH_ALL = found::WITH_ALL, SINCE = found::SINCE, NEVER = found::NEVER, EMPTY; scalar: MOST_QUANTA];
 
 /// No candidate in a slot.
@@ -111,36 +113,36 @@ pub mod status {
     }
     /// Largest contact stiffness over mass, bits of an f32, 1/s².
     pub const CONTACT_RATE: usize = 5;
-    /// Nodes and beams that touch something.
+    /// Nodes and beams in contact.
     pub const TOUCHING: [usize; 3] = [6, 7, 8];
     /// Largest speed of a node, bits of an f32, mm/s.
     pub const SPEED: usize = 9;
-    /// A node whose contact force outgrew its integer.
+    /// A node whose contact force overflowed its integer.
     pub const CULPRIT: usize = 10;
-    /// Carriers and beams whose candidates were searched.
+    /// Number of carriers and beams whose candidates were searched.
     pub const SEARCHED: usize = 11;
     /// Size of the buffer.
     pub const SIZE: usize = 16;
 
     /// A cell of the grid is full.
     pub const CELL_FULL: u32 = 1;
-    /// The list of a carrier, the slots of a point or of a beam are full.
+    /// The list of a carrier, or the slots of a point or beam, are full.
     pub const SLOTS_FULL: u32 = 2;
-    /// A contact force outgrew its integer.
+    /// A contact force overflowed its integer.
     pub const FORCE_RANGE: u32 = 4;
     /// A position is not a number.
     pub const NOT_FINITE: u32 = 8;
     /// A displacement left the range of its quanta.
     pub const OUT_OF_RANGE: u32 = 16;
 
-    /// What twins know of the status; those that have a place for each kind of pair start with that of threads on yarns.
+    /// Status constants shared with the twins; places that exist per kind of pair are given for threads on yarns, the first kind.
     pub const CONSTANTS: [Constant; 13] = constants![
         uint: FLAGS, TRAVEL, PENETRATION = PENETRATION[0], CONTACT_RATE, TOUCHING = TOUCHING[0], SPEED, CULPRIT, SEARCHED,
             CELL_FULL, SLOTS_FULL, FORCE_RANGE, NOT_FINITE, OUT_OF_RANGE
     ];
 }
 
-/// Key of a candidate: what is touched, and in which lateral image, −8 to 7 periods along x and y.
+/// Key of a candidate: the touched body or beam and its lateral image, −8 to 7 periods along x and y.
 #[inline(always)]
 pub fn key(body: usize, image: [i32; 2]) -> u32 {
     (body as u32) << 8 | ((image[0] + 8) as u32 & 15) << 4 | ((image[1] + 8) as u32 & 15)
@@ -152,13 +154,13 @@ pub fn of_key(key: u32) -> (usize, [i32; 2]) {
     ((key >> 8) as usize, [(key >> 4 & 15) as i32 - 8, (key & 15) as i32 - 8])
 }
 
-/// Where an image lies, in quanta along x and y.
+/// Shift of an image, in quanta along x and y.
 #[inline(always)]
 pub fn shift<const PERIODIC: bool>(period: [i32; 2], image: [i32; 2]) -> [i32; 2] {
     if PERIODIC { [image[0].wrapping_mul(period[0]), image[1].wrapping_mul(period[1])] } else { [0; 2] }
 }
 
-/// What a component of the force of a pair stays below, quanta.
+/// Upper bound of a force component of a pair, quanta.
 const MOST_QUANTA: f64 = (1 << 27) as f64;
 
 /// Adds a force in quanta to a node.
@@ -170,7 +172,7 @@ pub fn add_force(forces: &[AtomicI32], node: usize, quanta: [i32; 3]) {
     }
 }
 
-/// Whether a component of a force fits its integer; else names the node.
+/// Whether a force component fits its integer; else records the node.
 #[inline(always)]
 fn is_in_range<R: Real>(status: &[AtomicU32], quanta: R, node: usize) -> bool {
     let fits = quanta.abs() < R::from_f64(MOST_QUANTA);
@@ -181,7 +183,7 @@ fn is_in_range<R: Real>(status: &[AtomicU32], quanta: R, node: usize) -> bool {
     fits
 }
 
-/// Adds a force to one node and its opposite, by weights, to others: as integers, so that the sum is exactly zero.
+/// Adds a force to one node and, by weights, its opposite to others: as integers, so that the sum is exactly zero.
 #[inline(always)]
 pub fn add_pair<R: Real, const N: usize, const M: usize>(
     forces: &[AtomicI32],

@@ -1,11 +1,11 @@
-//! Which beams are near each other: the pairs of a beam, found by the grid, and the pieces of lines that a pair is.
+//! Pairs of nearby beams: found by the grid, each with the line pieces of its beams.
 //!
-//! A pair is two beams; the one with the lower number integrates over the other. The pairs of a beam with the beams of one thread that
-//! follow each other are a chain: each takes off the joint with the one before it if that one is in the chain too.
+//! In a pair of beams, the beam with the lower number integrates over the other. The pairs of a beam with consecutive beams of
+//! one thread form a chain: each subtracts the joint with the previous beam if that beam is in the chain too.
 //!
-//! Two points of a thread that bends to a circle of radius ρ lie 2ρ sin(a/2ρ) apart, with a the arc between them. No bend is tighter
-//! than ρ = r, where the inside folds, so points within an arc of π r, half a turn of the tightest loop, never touch: beams of one
-//! thread with nearer ends closer than that along it are no pair.
+//! Two points of a thread bent to a circle of radius ρ are 2ρ sin(a/2ρ) apart, with a the arc between them. No bend is tighter
+//! than ρ = r, where the inside folds, so points within an arc of π r, half a turn of the tightest loop, never touch. Beams of
+//! one thread whose nearer ends are closer than this along the thread form no pair.
 
 use super::arc_offset::{self, OffsetLines, Piece};
 use super::grid::{self, BOX, MOTION, absolute, cell_index, cells, has_moved, inverse, pull_back};
@@ -23,7 +23,7 @@ use crate::kernel::vector::{Vector, add, apply, sub};
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
-/// What the search and the forces read of beams first.
+/// Beam slots that both the search and the forces read first.
 pub const READS: [Slot; 7] = [
     Slot::read("ends", Uint),
     Slot::read("beams", Scalar),
@@ -52,7 +52,7 @@ const PAIRS: [Slot; 14] = joined(
 /// Finds pairs of beams.
 pub struct Pairs<const PERIODIC: bool>;
 
-/// What the search and the forces read of beams.
+/// Beam data that the search and the forces read.
 pub struct Scene<'a, R, const PERIODIC: bool> {
     pub ends: &'a [u32],
     pub beams: &'a [R],
@@ -88,7 +88,7 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
         self.offsets.piece::<PERIODIC>(self.beams, self.ends, beam, &self.displacement, self.gradient)
     }
 
-    /// The pieces of beam `a`, which is known, and of `b` in an image, in the reference and now.
+    /// The pieces of the known beam `a` and of `b` in an image, in the reference and current states.
     #[inline(always)]
     pub fn segments(&self, a: usize, own: &Piece<R>, b: usize, image: [i32; 2]) -> [Segments<R>; 2] {
         let other = self.piece(b);
@@ -104,7 +104,7 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
         [between(own.rest, rest, other.rest), between(own.now, now, other.now)]
     }
 
-    /// Whether beam `a` takes the joint at the first end of `b` off: where it is a pair with the beam before `b` too.
+    /// Whether beam `a` subtracts the joint at the first end of `b`: it does if it also forms a pair with the beam before `b`.
     #[inline(always)]
     pub fn owns(&self, a: usize, b: usize, image: [i32; 2]) -> bool {
         let before = self.offsets.before(b, image);
@@ -112,7 +112,7 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
     }
 }
 
-/// What tells a beam which others are near.
+/// The search data for the neighbours of a beam.
 struct Search<'a, R, const PERIODIC: bool> {
     scene: Scene<'a, R, PERIODIC>,
     params: Params,
@@ -127,7 +127,7 @@ struct Search<'a, R, const PERIODIC: bool> {
 type Cells = [(i32, i32); 2];
 
 impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
-    /// The cells of a beam's piece; `None` if it is nowhere.
+    /// The cells of a beam's piece; `None` if its position is not finite.
     #[inline(always)]
     fn cells(&self, io: &Io<R>, beam: usize, piece: &Piece<R>) -> Option<Cells> {
         let (node, _) = absolute::<Pairs<PERIODIC>, _>(io, &self.inverse, self.scene.ends[2 * beam] as usize);
@@ -139,7 +139,7 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
         (node[0].is_finite() && node[1].is_finite()).then(|| [range(0), range(1)])
     }
 
-    /// The items of a cell; more than it can hold if it is full.
+    /// The items of a cell; if it is full, the count exceeds its capacity.
     #[inline(always)]
     fn items(&self, x: i32, y: i32) -> Option<&[u32]> {
         let cell = cell_index(&self.params, x, y);
@@ -148,7 +148,7 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
             .then(|| &self.lists[cell * capacity..][..self.counts[cell] as usize])
     }
 
-    /// Whether a beam of a higher number in these cells has moved relative to this one since everything was searched; `None` if a
+    /// Whether a beam of a higher number in these cells has moved relative to this one since the last full search; `None` if a
     /// cell is full.
     #[inline(always)]
     fn has_moved(&self, beam: usize, [xs, ys]: Cells) -> Option<bool> {
@@ -169,7 +169,7 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
         Some(moved)
     }
 
-    /// The image of an item that is nearest to a beam.
+    /// The image of an item nearest to a beam.
     #[inline(always)]
     fn image(&self, beam: usize, near: usize) -> [i32; 2] {
         let item = self.params.slabs as usize + beam;
@@ -189,7 +189,7 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
         now.distance() < self.reach
     }
 
-    /// Takes pairs that are out of reach off a beam's list; how many are left.
+    /// Removes pairs out of reach from a beam's list; returns the number left.
     #[inline(always)]
     fn keep(&self, beam: usize, piece: &Piece<R>, keys: &mut [u32], states: &mut [R]) -> usize {
         let size = self.params.state as usize;
@@ -209,7 +209,8 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
         count
     }
 
-    /// Adds pairs within reach to a beam's list of `count`, in ascending order whatever that of the cells is; `false` if there is no room.
+    /// Inserts pairs within reach into a beam's list of `count`, in ascending order for any cell order; `false` if there is no
+    /// room.
     #[inline(always)]
     fn fill(
         &self,
@@ -292,7 +293,7 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
                 continue;
             };
             let when = when.at(0, beam);
-            // overflow keeps what was known, and is searched again with larger tables
+            // an overflow keeps the known pairs and triggers a new search with larger tables
             let Some(moved) = search.has_moved(beam, cells) else { continue };
             if !moved && *when == found::WITH_ALL {
                 continue;

@@ -1,13 +1,13 @@
-//! Penalty contact of points with the closed surfaces of yarns, every step: points along the beams of a thread, and the nodes of
-//! yarn surfaces.
+//! Penalty contact of points with the closed surfaces of yarns, every step: points along the beams of a thread, and the nodes
+//! of yarn surfaces.
 //!
 //! The elastic force is the gradient of the potential of [`super::potential`].
 //!
-//! What a pair loses is not of the energy: damping of the approach and friction act once for each point and body, along
-//! and across the resultant, against the mean motion of the faces that push, each by its force: a choice among the walls of a valley
-//! would jump from step to step.
+//! The dissipative forces do not follow from the potential. Normal damping and friction act once per point and body, along and
+//! across the resultant, against the mean motion of the pushing faces, weighted by their forces: a choice of one wall of a
+//! valley would jump from step to step.
 //!
-//! Every face of a point's list has a gap counter. It is looked at again once bodies can have closed the gap.
+//! Every face of a point's list has a gap counter. A face is evaluated again once the bodies can have closed its gap.
 
 use super::candidates::MADE;
 use super::face::{Closest, Patch, closest};
@@ -29,7 +29,7 @@ use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
-/// What the twin takes from Rust, of points of a `kind`.
+/// Constants shared with the twin, for points of a `kind`.
 const fn shared(kind: usize, friction: bool) -> [Constant; 9] {
     constants![uint: LEAST, CLOSED, INNER, GAPS, NORMAL, DAMPED, ELASTIC, TOUCH = touch(friction), KIND = kind]
 }
@@ -56,23 +56,23 @@ const SLOTS: [Slot; 16] = [
 /// Contact forces of points of threads (`THREAD`) or of nodes of yarn surfaces on yarns.
 pub struct Penalty<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool>;
 
-/// Place of the kind of points in the status.
+/// Index of the kind of points in the status.
 const fn kind(threads: bool) -> usize {
     if threads { 0 } else { 1 }
 }
 
-/// Viscosity, N·s/mm, that damps a spring of `penalty` (N/mm) between masses of joint inverse `inverse` (1/tonne) by the share of
-/// the critical one that is asked for.
+/// Viscosity, N·s/mm, for a given share of critical damping of a spring of `penalty` (N/mm) between masses of joint inverse
+/// `inverse` (1/tonne).
 #[inline(always)]
 fn viscosity<R: Real>(params: &Params, penalty: R, inverse: R) -> R {
     R::from_f64(f64::from(params.damping)) * R::from_f64(2.0) * (penalty / inverse).sqrt()
 }
 
-/// What one step reads and adds to.
+/// Inputs and sums of one step.
 struct Step<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> {
     params: Params,
     row: &'a Row<R>,
-    /// Time since the positions before, s.
+    /// Time since the previous positions, s.
     elapsed: R,
     surface: Surface<'a, R, PERIODIC>,
     velocity: Field<'a, R>,
@@ -80,11 +80,11 @@ struct Step<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> {
     forces: &'a [AtomicI32],
     stiffness: &'a [AtomicI32],
     flags: &'a [AtomicU32],
-    /// Place of the kind of points in the status.
+    /// Index of the kind of points in the status.
     kind: usize,
 }
 
-/// What damping and friction do to a point, N, and a bound of all its stiffness against a body, N/mm.
+/// Damping and friction force on a point, N, and an upper bound of its total stiffness against a body, N/mm.
 struct Rubbed<R> {
     force: Vector<R>,
     rows: R,
@@ -115,19 +115,19 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         }
     }
 
-    /// How much of a gap a point, of weights whose sizes add up to `size`, can have closed since the positions before, mm.
+    /// Largest closure of a gap since the previous positions, mm, for a point whose weights have the absolute sum `size`.
     #[inline(always)]
     fn closing(&self, size: R, full_radius: R) -> R {
         let reach = R::from_f64(0.5) * (R::from_f64(1.0) + size);
         self.row.approach * reach * self.elapsed + full_radius * self.row.radius_increment
     }
 
-    /// What all bodies of a list do to a point, which bodies can have come nearer to by `closed` since faces were last looked at, in
-    /// the last step by `closing`, mm.
+    /// Forces of all bodies of a list on a point. The bodies can have approached by `closed` since the last evaluation of
+    /// faces, and by `closing` in the last step, mm.
     #[inline(always)]
     fn all_bodies<const N: usize>(&self, at: &Point<R, N>, list: &[u32], closed: R, closing: R, kept: &mut Kept<R>) {
         let zero = R::from_f64(0.0);
-        // a point that was inside is no deeper than this now
+        // upper bound of the penetration of a point that was inside
         let deepest = kept.gaps[INNER] + closing;
         let most = deepest + margin(at.radius + deepest);
         let skin = R::from_f64(f64::from(self.params.skin));
@@ -173,7 +173,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         }
     }
 
-    /// Damping, friction, and what is left of a body's touch; what they do if it still touches.
+    /// Damping, friction, and the end of a body's touch; returns the forces if it still touches.
     #[inline(always)]
     fn settle<const N: usize>(
         &self,
@@ -202,8 +202,8 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         Some(rubbed)
     }
 
-    /// Adds what a face does to a point; returns the gap, or as much as is sure to be left of it, mm. A face whose gap is sure to
-    /// exceed `most` need not be looked at closely.
+    /// Adds the forces of a face on a point; returns the gap or a lower bound of it, mm. A face whose gap certainly exceeds
+    /// `most` is not evaluated closely.
     #[inline(always)]
     fn face<const N: usize>(&self, at: &Point<R, N>, entry: u32, most: R, pushed: &mut Pushed<R>) -> R {
         let corners = self.corners(at, entry);
@@ -242,19 +242,19 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         gap
     }
 
-    /// The body that an entry belongs to.
+    /// The body of an entry.
     #[inline(always)]
     fn body(&self, entry: u32) -> u32 {
         let (face, image) = of_key(entry);
         self.surface.body(face, image)
     }
 
-    /// What a body does to a point, by its entries and their gaps: those that are no larger than `most` are looked at.
+    /// Forces of a body on a point, by its entries and their gaps: entries with gaps up to `most` are evaluated.
     #[inline(always)]
     fn look<const N: usize>(&self, at: &Point<R, N>, entries: &[u32], gaps: &mut [R], most: R) -> Pushed<R> {
         let mut pushed = Pushed::none();
         for again in [false, true] {
-            // a point that seems to be inside is so only if no other face is nearer
+            // a point that seems to be inside is inside only if no other face is nearer
             if again && !pushed.is_behind(&self.params, most) {
                 break;
             }
@@ -275,7 +275,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         self.surface.corners(face, image, at.nodes[0], at.from)
     }
 
-    /// Looks at a face closely.
+    /// Evaluates a face closely.
     #[inline(always)]
     fn see<const N: usize>(&self, at: &Point<R, N>, entry: u32, corners: Corners<R>, patch: &Patch<R>) -> Seen<R> {
         let point = closest(&corners.current, patch);
@@ -283,7 +283,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         Seen { entry, corners, point, push }
     }
 
-    /// Adds what a face does to a point to the nodes, with its share of what damping and friction do.
+    /// Adds the forces of a face on a point to the nodes, with its share of damping and friction.
     #[inline(always)]
     fn press<const N: usize>(
         &self,
@@ -316,8 +316,8 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         add_stiffness(self.stiffness, rubbed.rows * share, quantum, corners.nodes.into_iter().zip(point.weights));
     }
 
-    /// Adds forces to the corners of a face, and their opposite to what acts on the point, as integers whose sum is zero: the last
-    /// corner takes what the rounding of the others leaves.
+    /// Adds forces to the corners of a face and their opposite to the force on the point, as integers whose sum is zero: the
+    /// last corner takes the rounding error of the others.
     #[inline(always)]
     fn pull(&self, corners: &Corners<R>, pull: &[Vector<R>; 4], own: &mut [i32; 3], sums: &mut [R]) {
         let quantum = R::from_f64(f64::from(self.params.force_quantum));
@@ -341,8 +341,8 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         }
     }
 
-    /// What damping and friction do, once for a point and a body: against the mean motion of the faces that push, by their forces. A
-    /// touch with its state goes on.
+    /// Damping and friction, once per point and body: against the mean motion of the pushing faces, weighted by their forces.
+    /// An existing touch continues with its state.
     #[inline(always)]
     fn rub<const N: usize>(
         &self,
@@ -368,7 +368,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         let approach = dot(motion, normal);
         let viscosity = viscosity(&self.params, at.penalty, inverse);
         let pressing = (size - viscosity * approach).max(zero);
-        // over the way since the positions before, with the mean of the forces before and now
+        // over the motion since the previous positions, with the mean of the old and new forces
         let drag = size - pressing;
         sums[SUM_DAMPING] = sums[SUM_DAMPING] + half * (touch[DAMPED] + drag) * approach * self.elapsed;
         (touch[NORMAL], touch[DAMPED]) = (pressing, drag);
@@ -390,7 +390,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         Rubbed { force, rows }
     }
 
-    /// Adds what acts on a point to its nodes.
+    /// Distributes the force on a point to its nodes.
     #[inline(always)]
     fn share_out<const N: usize>(&self, at: &Point<R, N>, own: [i32; 3]) {
         let mut rest = own;
@@ -404,8 +404,8 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
     }
 }
 
-/// The place of a body among the touches of a point; if it `begins` to touch, a free one, of which there are as many as bodies in a
-/// list. `None` if it does not touch.
+/// The index of a body among the touches of a point; if it `begins` to touch, a free index (there are as many as bodies in a
+/// list). `None` if it does not touch.
 #[inline(always)]
 fn place_of(keys: &[u32], key: u32, begins: bool) -> Option<usize> {
     let known = keys.iter().position(|known| *known == key);
@@ -440,7 +440,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
     }
 }
 
-/// Forces of points that `N` nodes carry, whose places in the status are those of a `kind`.
+/// Forces of points carried by `N` nodes; `kind` gives their places in the status.
 #[inline(always)]
 fn run<R: Real, const N: usize, const FRICTION: bool, const PERIODIC: bool>(
     io: &Io<R>,

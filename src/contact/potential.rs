@@ -1,19 +1,19 @@
-//! The potential of a point near the closed surface of a body, and what pushes the point.
+//! The contact potential of a point near the closed surface of a body, and its forces on the point.
 //!
-//! The force is the gradient of one energy. With b(d) = ½ k ⟨r − d⟩² of the distance d to a closed feature, ⟨·⟩ the positive
-//! part, a point of radius r has
+//! The force is the gradient of one energy. With b(d) = ½ k ⟨r − d⟩², where d is the distance to a closed feature and ⟨·⟩ the
+//! positive part, the energy of a point of radius r is
 //!
 //! ```text
 //! Ψ = Σ_faces b − Σ_edges b + Σ_corners b  +  inside · [½ k (r + d)² − b(d)]
 //! ```
 //!
-//! The signed sum is ∫ −b′(ρ) χ(ρ) dρ with χ(ρ) the Euler characteristic of the surface within ρ of the point: 1 for a piece
-//! of it, 2 for two walls, however it is cut into faces. So a flat or convex surface pushes with b of its distance, both walls
-//! of a valley push, and the force is continuous across edges and corners (inclusion and exclusion, as in Li et al.,
-//! Convergent Incremental Potential Contact, 2023; its reading as an Euler characteristic is our own).
+//! The signed sum is ∫ −b′(ρ) χ(ρ) dρ with χ(ρ) the Euler characteristic of the part of the surface within ρ of the point: 1
+//! for a single piece, 2 for two walls, for any subdivision into faces. So a flat or convex surface pushes with b of its
+//! distance, both walls of a valley push, and the force is continuous across edges and corners (inclusion–exclusion, as in Li
+//! et al., Convergent Incremental Potential Contact, 2023; the interpretation as an Euler characteristic is our own).
 //!
-//! A body is closed: a point is inside if it lies behind what of the surface is nearest, and what is nearest then pushes
-//! it out. On the surface both parts of the energy meet. The nodes of yarns have no radius, and of the energy ½ k d² is left.
+//! A body is closed: a point is inside if it lies behind the nearest part of the surface, which then pushes it out. On the
+//! surface the inside and outside energies agree. Yarn nodes have no radius, so only the energy ½ k d² remains.
 
 use super::face::{Closest, OnEdge, on_corner, on_edge};
 use super::surface::Corners;
@@ -22,14 +22,15 @@ use crate::kernel::interface::{Constant, constants};
 use crate::kernel::lane::Real;
 use crate::kernel::vector::{Vector, add, fma, scale};
 
-/// More than rounding moves a gap, mm: a face that touches by less than that must not be missed, whenever its gap was last known.
+/// Upper bound of the rounding error of a gap, mm: a face that touches by less must not be missed, whenever its gap was last
+/// evaluated.
 const GAP_ROUNDING: f64 = 1e-6;
-/// Two places are equally near if their distances differ by no more than this share of them.
+/// Two distances count as equal if they differ by at most this share.
 const TIE: f64 = 1e-4;
-/// What the twin takes from Rust.
+/// Constants shared with the twin.
 pub const CONSTANTS: [Constant; 2] = constants![scalar: GAP_ROUNDING, TIE];
 
-/// How much farther than what is nearest, at a `distance`, a face may be and still count as equally near, with room, mm.
+/// Tolerance within which a face counts as nearest at a `distance`, with a safety margin, mm.
 #[inline(always)]
 pub fn margin<R: Real>(distance: R) -> R {
     R::from_f64(2.0 * TIE) * distance + R::from_f64(GAP_ROUNDING)
@@ -39,17 +40,17 @@ pub fn margin<R: Real>(distance: R) -> R {
 pub struct Point<R, const N: usize> {
     pub nodes: [usize; N],
     pub weights: [R; N],
-    /// From its first node, in the reference and now.
+    /// Position relative to its first node, in the reference and current states.
     pub from: (Vector<R>, Vector<R>),
     pub penalty: R,
     pub full_radius: R,
     pub radius: R,
-    /// Sum of the sizes of the weights.
+    /// Sum of the absolute weights.
     pub size: R,
 }
 
-/// Where the surface of a body is nearest to a point: the entry of its face; unit vector from there; distance, and height above the
-/// face, mm.
+/// The nearest point of a body's surface: the entry of its face; unit vector from there to the point; distance, and height
+/// above the face, mm.
 #[derive(Clone, Copy)]
 pub struct Nearest<R> {
     pub found: bool,
@@ -59,22 +60,22 @@ pub struct Nearest<R> {
     pub height: R,
 }
 
-/// Force, N, and energy, mJ, that push a point out that is inside and so far from the surface, mm.
+/// Force, N, and energy, mJ, on a point inside, for its depth below the surface, mm.
 #[inline(always)]
 pub fn out<R: Real, const N: usize>(at: &Point<R, N>, depth: R) -> (R, R) {
     let (whole, outside) = (at.radius + depth, (at.radius - depth).max(R::from_f64(0.0)));
     (at.penalty * (whole + outside), R::from_f64(0.5) * at.penalty * (whole * whole - outside * outside))
 }
 
-/// How a face, with the edges and corners that it owns, pushes a point.
+/// Forces of a face on a point, with the edges and corners that it owns.
 #[derive(Clone, Copy)]
 pub struct Push<R> {
-    /// What acts on its corners, N.
+    /// Forces on its corners, N.
     pub pull: [Vector<R>; 4],
-    /// Energy, mJ, and sum of the forces along their own directions, N: what the energy gains for each mm of radius.
+    /// Energy, mJ, and sum of the force magnitudes, N: the derivative of the energy by the radius.
     pub energy: R,
     pub pressing: R,
-    /// Features that push.
+    /// Number of pushing features.
     pub count: R,
 }
 
@@ -85,7 +86,7 @@ impl<R: Real> Push<R> {
         Self { pull: [[zero; 3]; 4], energy: zero, pressing: zero, count: zero }
     }
 
-    /// Adds a `force` (N) on the point, `away` from a place by weights of the corners, and its `energy` (mJ).
+    /// Adds a `force` (N) on the point in the direction `away` from a place given by corner weights, and its `energy` (mJ).
     #[inline(always)]
     pub fn add(&mut self, weights: [R; 4], away: Vector<R>, force: R, energy: R) {
         self.energy = self.energy + energy;
@@ -115,7 +116,7 @@ impl<R: Real> Push<R> {
         scale(add(add(a, b), add(c, d)), R::from_f64(-1.0))
     }
 
-    /// Of a face with edges and corners by its `marks`.
+    /// Forces of a face with the edges and corners in its `marks`.
     #[inline(always)]
     pub fn of_face<const N: usize>(at: &Point<R, N>, q: &[Vector<R>; 4], marks: u32, point: &Closest<R>) -> Self {
         let (mut push, depth) = (Self::none(), at.radius - point.distance);
@@ -137,7 +138,7 @@ impl<R: Real> Push<R> {
     }
 }
 
-/// A face of a list that was looked at.
+/// An evaluated face of a list.
 #[derive(Clone, Copy)]
 pub struct Seen<R> {
     pub entry: u32,
@@ -157,10 +158,10 @@ impl<R: Real> Seen<R> {
     }
 }
 
-/// What a body does to a point.
+/// Forces of a body on a point.
 pub struct Pushed<R> {
     pub nearest: Nearest<R>,
-    /// The last face that pushes or was nearest: mostly the only one, which need not be looked at again.
+    /// The last face that pushed or was nearest: usually the only one, which need not be evaluated again.
     pub last: Seen<R>,
     /// Whether the point is pushed out from behind the nearest face.
     pub inside: bool,
@@ -171,8 +172,8 @@ pub struct Pushed<R> {
     pub features: R,
     /// Sum of the forces of faces, N.
     pub shared: R,
-    /// Of places on the faces that push, times their forces, or of the nearest place if none does: velocity, mm/s, reference place from
-    /// the point, mm, and inverse mass, 1/tonne.
+    /// Sums over the places on pushing faces, weighted by their forces, or the values of the nearest place if no face pushes:
+    /// velocity, mm/s, reference position relative to the point, mm, and inverse mass, 1/tonne.
     pub motion: Vector<R>,
     pub apart: Vector<R>,
     pub inverse: R,
@@ -200,8 +201,8 @@ impl<R: Real> Pushed<R> {
         }
     }
 
-    /// Whether a place is nearer than what is known. Of faces whose common edge or corner is nearest, the one that is seen most
-    /// steeply tells on which side the point is.
+    /// Whether a place is nearer than the known one. If several faces share the nearest edge or corner, the face seen most
+    /// steeply decides on which side the point lies.
     #[inline(always)]
     pub fn is_nearer(&self, point: &Closest<R>) -> bool {
         let known = &self.nearest;
@@ -210,21 +211,22 @@ impl<R: Real> Pushed<R> {
         !known.found || apart < -tie || apart <= tie && point.height.abs() > known.height.abs()
     }
 
-    /// Whether the point is behind the nearest place that is known, no deeper than what is pushed out, nor than `most` (mm), which it
-    /// can have come to since it was looked at: at a corner of a crumpled surface, a point in front may look as if it were behind.
+    /// Whether the point is behind the nearest known place, within the depth that is pushed out, and within `most` (mm), the
+    /// largest depth it can have reached since its last evaluation: at a corner of a crumpled surface, a point in front may
+    /// appear to be behind.
     #[inline(always)]
     pub fn is_behind(&self, params: &Params, most: R) -> bool {
         let Nearest { found, distance, height, .. } = self.nearest;
         found && height < R::from_f64(0.0) && distance < most.min(R::from_f64(f64::from(params.depth)))
     }
 
-    /// Distance from which on a face cannot change what is nearest, mm.
+    /// Distance beyond which a face cannot change the nearest place, mm.
     #[inline(always)]
     pub fn beyond(&self) -> R {
         self.nearest.distance * R::from_f64(1.0 - 2.0 * TIE) - R::from_f64(0.2 * GAP_ROUNDING)
     }
 
-    /// Adds what pushes a point out that is inside; returns how deep it is, mm.
+    /// Adds the force that pushes out a point inside; returns its depth, mm.
     #[inline(always)]
     pub fn push_out<const N: usize>(&mut self, at: &Point<R, N>) -> R {
         let Nearest { away, distance, .. } = self.nearest;
@@ -237,7 +239,7 @@ impl<R: Real> Pushed<R> {
         distance
     }
 
-    /// Adds what a face does.
+    /// Adds the forces of a face.
     #[inline(always)]
     pub fn add(&mut self, push: &Push<R>) {
         self.push = add(self.push, push.total());

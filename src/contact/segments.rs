@@ -3,25 +3,26 @@
 //! ```text
 //! E = ∫_A φ(d²) ds,   φ(q) = k/(8R²) ⟨R² − q⟩²,   R: distance at which both touch, mm; k: penalty per length, N/mm²
 //! ```
-//! Where they just touch, φ is ½ k (R − d)²: a force k per length and depth. Integrals along lines have no trouble with lines that
-//! are parallel or nearly so, where the closest pair of points is not unique (Meier, Wall, Popp, arXiv 1603.09227).
+//! Near first touch, φ is ½ k (R − d)²: a force k per length and depth. Line integrals have no difficulty with parallel or
+//! nearly parallel lines, for which the closest pair of points is not unique (Meier, Wall, Popp, arXiv 1603.09227).
 //!
-//! The point of B that is closest to a point s (0 to 1) of A is the first end, then one that moves along B in proportion to s, then
-//! the second end. In each of these three parts q is a polynomial of degree 2 in s, and is below R² in one interval, so three points of Gauss
-//! integrate energy (degree 4) and forces on ends (degree 4) exactly. Borders move with positions, but q is continuous and φ vanishes at R with
-//! its slope, so the forces are the gradient of the energy. A counts with its length at rest, which does not move. Nothing is normalised
-//! and lines may cross: the force between points that coincide is zero.
+//! The closest-point projection of a point s (0 to 1) of A onto B is the first end of B, then a point that moves along B in
+//! proportion to s, then the second end. In each of these three parts q is a polynomial of degree 2 in s, and is below R² in
+//! one interval, so three Gauss points integrate energy (degree 4) and forces on ends (degree 4) exactly. The interval limits
+//! move with positions, but q is continuous and φ and its slope vanish at R, so the forces are the gradient of the energy. A
+//! enters with its constant reference length. Nothing is normalised and lines may cross: the force between coincident points is
+//! zero.
 //!
-//! A chain of segments is covered once by those and what is around each joint is not counted twice: from the energy of all segments that of
-//! all joints of two of them is taken off, ∫_A φ(|x − joint|²) ds (inclusion–exclusion, as in Li et al. 2023, Convergent Incremental Potential
-//! Contact). Hence neither side depends on how it is cut into segments. One that *owns* the joint at its first end has it taken off, where
-//! that end is closest both cancel and nothing is left.
+//! The segments of a chain overlap around each joint, which must count once. From the energy of all segments the energy of all
+//! joints of two segments is subtracted, ∫_A φ(|x − joint|²) ds (inclusion–exclusion, as in Li et al. 2023, Convergent
+//! Incremental Potential Contact). Hence the energy is independent of the subdivision of either side. A segment that *owns* the
+//! joint at its first end subtracts it; where that end is closest, both terms cancel.
 
 use crate::kernel::interface::{Constant, constants};
 use crate::kernel::lane::Real;
 use crate::kernel::vector::{Vector, add, dot, fma, scale, sub};
 
-/// Two segments, seen from the first end of A, mm.
+/// Two segments, relative to the first end of A, mm.
 pub struct Segments<R> {
     /// To the second end of A.
     pub along: Vector<R>,
@@ -31,7 +32,7 @@ pub struct Segments<R> {
     pub other: Vector<R>,
 }
 
-/// Points of A from `low` to `high`, whose partners on B are `base + slope s`; all from 0 to 1.
+/// Points of A from `low` to `high`, with projections `base + slope s` on B; all from 0 to 1.
 #[derive(Clone, Copy)]
 struct Part<R> {
     low: R,
@@ -40,7 +41,7 @@ struct Part<R> {
     slope: R,
 }
 
-/// What presses two segments apart.
+/// Contact forces between two segments.
 pub struct Push<R> {
     /// Energy, mJ, and its derivative by the distance R, N.
     pub energy: R,
@@ -48,27 +49,28 @@ pub struct Push<R> {
     /// Forces on the ends of A and of B, N.
     pub own: [Vector<R>; 2],
     pub others: [Vector<R>; 2],
-    /// Bounds of the stiffness at the ends of A and of B, N/mm: of what pushes, without what is taken off.
+    /// Bounds of the stiffness at the ends of A and of B, N/mm: of the pushing terms only, without the subtracted joints.
     pub own_rows: [R; 2],
     pub other_rows: [R; 2],
     /// Stiffness of the contact, N/mm.
     pub stiffness: R,
-    /// Where it is along A and along B, times `weight`.
+    /// Contact position along A and along B, times `weight`.
     pub at: [R; 2],
-    /// Sum of what pushes; zero if nothing touches.
+    /// Sum of the pushing weights; zero without contact.
     pub weight: R,
 }
 
-/// Points and weights of Gauss on 0 to 1.
+/// Gauss points and weights on 0 to 1.
 const GAUSS: [[f64; 2]; 3] =
     [[0.112_701_665_379_258_31, 5.0 / 18.0], [0.5, 8.0 / 18.0], [0.887_298_334_620_741_7, 5.0 / 18.0]];
-/// Least |dq/ds| of partners and least curvature of q over R², so that divisions are of numbers: of lines at right angles, and parallel.
+/// Lower bounds of |dq/ds| of projections and of the curvature of q over R², to avoid division by zero: for lines at right
+/// angles, and parallel.
 const STRAIGHT: f64 = 1e-20;
-/// What the twin takes from Rust.
+/// Constants shared with the twin.
 pub const CONSTANTS: [Constant; 1] = constants![scalar: STRAIGHT];
 
 impl<R: Real> Segments<R> {
-    /// Where the first end of B, its inside and its second end are closest, and where the first end is not.
+    /// The parts of A where the first end of B, its inside and its second end are closest, and the part where the first end is not.
     #[inline(always)]
     fn parts(&self) -> [Part<R>; 4] {
         let (zero, one) = (R::from_f64(0.0), R::from_f64(1.0));
@@ -89,7 +91,7 @@ impl<R: Real> Segments<R> {
         }
     }
 
-    /// From the partner on B to a point s of A: at s = 0, and its change with s, mm.
+    /// Vector from the projection on B to a point s of A: its value at s = 0, and its change with s, mm.
     #[inline(always)]
     fn between(&self, part: &Part<R>) -> (Vector<R>, Vector<R>) {
         let base = sub(scale(self.other, -part.base), self.start);
@@ -113,8 +115,8 @@ impl<R: Real> Segments<R> {
         least.sqrt()
     }
 
-    /// What presses them apart when they touch at a distance of `reach` (mm), with the penalty times the length of A at rest
-    /// `strength` (N/mm); whether B owns the joint at its first end.
+    /// Contact forces of two segments that touch at a distance of `reach` (mm), with `strength` (N/mm), the penalty times the
+    /// reference length of A; `owns` tells whether B owns the joint at its first end.
     #[inline(always)]
     pub fn push(&self, reach: R, strength: R, owns: bool) -> Push<R> {
         let (zero, one) = (R::from_f64(0.0), R::from_f64(1.0));
@@ -141,7 +143,7 @@ impl<R: Real> Segments<R> {
     }
 }
 
-/// From where to where in a part q = |base + slope s|² is below `square`; from a point to the same if nowhere.
+/// Interval of a part in which q = |base + slope s|² is below `square`; an empty interval if there is none.
 #[inline(always)]
 fn touching<R: Real>(part: &Part<R>, base: Vector<R>, slope: Vector<R>, square: R) -> (R, R) {
     let zero = R::from_f64(0.0);
@@ -157,7 +159,7 @@ fn touching<R: Real>(part: &Part<R>, base: Vector<R>, slope: Vector<R>, square: 
 }
 
 impl<R: Real> Push<R> {
-    /// Adds a part, or takes it off with a `sign` of −1.
+    /// Adds a part, or subtracts it with a `sign` of −1.
     #[inline(always)]
     fn add(&mut self, segments: &Segments<R>, part: &Part<R>, reach: R, strength: R, sign: R) {
         let (zero, one) = (R::from_f64(0.0), R::from_f64(1.0));

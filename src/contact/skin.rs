@@ -1,15 +1,15 @@
-//! How fast nodes are, whether they are still numbers in range, and with contact how far they have travelled since there was last
-//! a look around for candidates.
+//! Contact skin (Verlet skin): largest nodal speed, validity of positions and, with contact, the distance travelled since the
+//! last candidate check.
 //!
-//! There is one as soon as a node has travelled by [`SKIN_USED`] of the contact skin. It searches again only where bodies have moved
-//! relative to each other: since the last search of everything, all nodes have noted where they were then, and candidates
-//! from then are good as long as nothing in reach has moved by more than [`SKIN_APART`] relative to its carrier. What is carried
-//! along with its surroundings, as by the clamp of a specimen, is not searched. One that was searched since then is searched at
-//! every look, until enough are for a search of everything to pay.
+//! A check is due once a node has travelled by [`SKIN_USED`] of the contact skin. It searches only where bodies have moved
+//! relative to each other: nodes store their displacements at the last full search, and candidates from that search stay valid
+//! as long as nothing within reach has moved by more than [`SKIN_APART`] relative to its carrier. Bodies that move with their
+//! surroundings, as in the clamp of a specimen, are not searched. A carrier searched since then is searched at every check,
+//! until there are enough of them for a full search to pay.
 //!
-//! A pair that is in no list was farther apart than reach and skin when the list was made. Since then it has come closer by at most
-//! `SKIN_APART` until the last look, as much by the affine motion of a periodic cell, and 2 × `SKIN_USED` since. The rest of the
-//! skin is for what nodes travel before the look that is due.
+//! A pair in no list was farther apart than reach plus skin when the list was made. It has come closer by at most `SKIN_APART`
+//! until the last check, by as much again through the affine motion of a periodic cell, and by 2 × `SKIN_USED` since. The rest
+//! of the skin covers the travel of nodes before the next check.
 
 use super::status;
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
@@ -23,17 +23,17 @@ use crate::kernel::vector::dot;
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
-/// Share of the contact skin that nodes may travel before a look.
+/// Share of the contact skin that nodes may travel before a check.
 pub const SKIN_USED: f64 = 0.25;
-/// And the one that bodies may have moved relative to each other since candidates were searched.
+/// Share that bodies may have moved relative to each other since candidates were searched.
 pub const SKIN_APART: f64 = 0.5 * SKIN_USED;
 
-/// What the twin takes from Rust.
+/// Constants shared with the twin.
 const CONSTANTS: &[&[Constant]] = &[&position::CONSTANTS, &status::CONSTANTS];
 
-/// Notes displacements at a look.
+/// Stores displacements at a check.
 pub struct Remember;
-/// Raises the largest speed; with `CONTACT` also the largest distance travelled since the last look.
+/// Updates the largest speed; with `CONTACT` also the largest distance travelled since the last check.
 pub struct Travel<const CONTACT: bool>;
 
 impl Kernel for Remember {
@@ -67,7 +67,7 @@ impl<const CONTACT: bool> Kernel for Travel<CONTACT> {
         Slot::read("quanta", Int),
         Slot::read("remainder", Scalar),
         Slot::read("velocity", Scalar),
-        // displacements at the last look
+        // displacements at the last check
         Slot::read("search_quanta", Int).when(CONTACT),
         Slot::read("search_remainder", Scalar).when(CONTACT),
         Slot::atomic("status", Uint),

@@ -1,4 +1,4 @@
-//! How far contact points have slipped since the start, for pictures: taken from the sums of contact before these are set back.
+//! Accumulated slip of contact points since the start, for pictures: read from the contact sums before they are reset.
 
 use super::sums::{SUM_SLIP, shared, sums};
 use crate::kernel::buffer::Kind::Scalar;

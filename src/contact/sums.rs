@@ -1,19 +1,19 @@
-//! What contact sums up for each point and each beam: energies, slip, and the share of the homogenised stress.
+//! Contact sums per point and beam: energies, slip, and the virial for the homogenised stress.
 
 use crate::kernel::interface::{Constant, constants};
 use crate::kernel::lane::Real;
 use crate::kernel::vector::Vector;
 
-/// Sums of a point or a beam: elastic energy now, mJ; over steps, energy lost to contact damping, and work of the growing
-/// radius, mJ.
+/// Sums of a point or a beam: current elastic energy, mJ; accumulated over steps, energy lost to contact damping, and work of
+/// the growing radius, mJ.
 pub const SUM_ENERGY: usize = 0;
 pub const SUM_DAMPING: usize = 1;
 pub const SUM_RADIUS: usize = 2;
-/// With friction: energy lost to it, mJ, and slip, mm.
+/// With friction: energy lost to friction, mJ, and slip, mm.
 pub const SUM_FRICTION: usize = 3;
 pub const SUM_SLIP: usize = 4;
 
-/// Where force ⊗ ΔX, N·mm (9), starts in the sums of a periodic scene.
+/// Start of the virial force ⊗ ΔX, N·mm (9), in the sums of a periodic scene.
 pub const fn virial(friction: bool) -> usize {
     if friction { SUM_SLIP + 1 } else { SUM_RADIUS + 1 }
 }
@@ -22,7 +22,7 @@ pub const fn sums(friction: bool, periodic: bool) -> usize {
     virial(friction) + if periodic { 9 } else { 0 }
 }
 
-/// What twins know of the sums.
+/// Constants of the sums shared with the twins.
 pub const fn shared(friction: bool, periodic: bool) -> [Constant; 7] {
     constants![
         uint: SUM_ENERGY, SUM_DAMPING, SUM_RADIUS, SUM_FRICTION, SUM_SLIP, SUM_VIRIAL = virial(friction),
@@ -30,7 +30,7 @@ pub const fn shared(friction: bool, periodic: bool) -> [Constant; 7] {
     ]
 }
 
-/// Subtracts force ⊗ ΔX from the nine sums that make the homogenised stress.
+/// Subtracts force ⊗ ΔX from the nine virial sums of the homogenised stress.
 #[inline(always)]
 pub fn add_virial<R: Real>(sum: &mut [R], force: Vector<R>, apart: Vector<R>) {
     for i in 0..3 {

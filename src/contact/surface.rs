@@ -1,9 +1,8 @@
-//! The surfaces of yarns as tables of faces, and points carried by nodes: places relative to a node, so that they are as exact far from
-//! the origin as near it.
+//! The surfaces of yarns as tables of faces, and points carried by nodes: positions are relative to a node, so that they are as
+//! exact far from the origin as near it.
 //!
-//! A face *owns* some of its edges and corners, so that each of a body is owned once: what is summed over faces, less what is
-//! summed over edges, plus what is summed over corners does not depend on how the surface is cut into faces (see
-//! [`super::penalty`]).
+//! A face *owns* some of its edges and corners, so that each edge and corner of a body is owned once: a sum over faces, minus
+//! edges, plus corners is then independent of the subdivision of the surface into faces (see [`super::penalty`]).
 
 use super::{key, shift};
 use crate::kernel::interface::{Constant, constants};
@@ -11,33 +10,33 @@ use crate::kernel::lane::Real;
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::vector::{Vector, add, apply, fma, sub};
 
-/// Integers of a face: four corners, counter-clockwise seen from outside, as [`coded`]; its marks, see [`marks`].
+/// Integers per face: four corners, counter-clockwise seen from outside, as [`coded`]; its marks, see [`marks`].
 pub const FACE: usize = 5;
-/// Integers of a point: up to four coded nodes that carry it; its list of faces.
+/// Integers per point: up to four coded nodes that carry it; its list of faces.
 pub const CARRIED: usize = 5;
-/// Numbers of a point: weights of its four nodes; penalty, N/mm; radius, mm.
+/// Numbers per point: weights of its four nodes; penalty, N/mm; radius, mm.
 pub const POINT: usize = 6;
-/// What twins know of faces and points, whose carriers are beams of `threads` or nodes of yarns.
+/// Constants of faces and points shared with the twins; carriers are beams of `threads` or nodes of yarns.
 pub const fn shared(threads: bool) -> [Constant; 4] {
     constants![uint: FACE, CARRIED, POINT, CARRIED_BY = if threads { 4 } else { 1 }]
 }
-/// Most nodes that a corner can tell apart, and most faces that an entry of a list can.
+/// Largest number of nodes that a corner can encode, and of faces that a list entry can encode.
 pub const MOST_NODES: usize = 1 << 26;
 pub const MOST_FACES: usize = (1 << 24) - 1;
 
-/// A node with the image in which it is seen, −1, 0 or 1 periods along x and y.
+/// A node and its image, −1, 0 or 1 periods along x and y, as one number.
 pub fn coded(node: usize, image: [i32; 2]) -> u32 {
     node as u32 | ((image[0] + 1) as u32) << 26 | ((image[1] + 1) as u32) << 28
 }
 
-/// Node and image of a [`coded`] one.
+/// Decodes a [`coded`] node and its image.
 #[inline(always)]
 pub fn of_coded(coded: u32) -> (usize, [i32; 2]) {
     ((coded & ((1 << 26) - 1)) as usize, [(coded >> 26 & 3) as i32 - 1, (coded >> 28) as i32 - 1])
 }
 
-/// Marks of a face: the edges (from corner `a` to the next one) and the corners that it owns, along which of x and y its body
-/// goes on in its own images, and the body.
+/// Marks of a face: the edges (from corner `a` to the next one) and corners that it owns, the axes x and y along which its body
+/// continues in its own images, and the body.
 pub fn marks(edges: [bool; 4], corners: [bool; 4], wraps: [bool; 2], body: usize) -> u32 {
     let bits = edges.into_iter().chain(corners).chain(wraps).enumerate();
     bits.fold((body as u32) << 10, |marks, (bit, is_set)| marks | u32::from(is_set) << bit)
@@ -60,7 +59,7 @@ pub struct Surface<'a, R, const PERIODIC: bool> {
     pub period: [i32; 2],
 }
 
-/// The corners of a face relative to a point: in the reference and now.
+/// The corners of a face relative to a point, in the reference and current states.
 #[derive(Clone, Copy)]
 pub struct Corners<R> {
     pub nodes: [usize; 4],
@@ -75,7 +74,7 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
         self.faces[FACE * face + 4]
     }
 
-    /// Key of the body and the lateral image that an entry belongs to. A yarn goes on through its own images: they are one body.
+    /// Key of the body and lateral image of an entry. A yarn that continues through its own images is one body.
     #[inline(always)]
     pub fn body(&self, face: usize, image: [i32; 2]) -> u32 {
         let marks = self.marks(face);
@@ -83,7 +82,7 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
         key((marks >> 10) as usize, [lateral(0), lateral(1)])
     }
 
-    /// Reference and current position of a node in an image relative to another one.
+    /// Reference and current position of a node in an image relative to another node.
     #[inline(always)]
     pub fn from_node(&self, node: usize, image: [i32; 2], base: usize) -> (Vector<R>, Vector<R>) {
         let rest: Vector<R> = self.reference.between(node, base, shift::<PERIODIC>(self.period, image));
@@ -91,7 +90,7 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
         (rest, add(affine, self.displacement.between(node, base)))
     }
 
-    /// A point of `N` coded nodes by weights, relative to the first of them, in the reference and now.
+    /// A point given by weights of `N` coded nodes, relative to the first of them, in the reference and current states.
     #[inline(always)]
     pub fn point<const N: usize>(&self, nodes: [u32; N], weights: [R; N]) -> (Vector<R>, Vector<R>) {
         let base = of_coded(nodes[0]).0;
@@ -104,7 +103,7 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
         point
     }
 
-    /// The corners of a face in an image, seen from a point that lies `from` beside a node.
+    /// The corners of a face in an image, relative to a point at the offset `from` from a node.
     #[inline(always)]
     pub fn corners(&self, face: usize, image: [i32; 2], base: usize, from: (Vector<R>, Vector<R>)) -> Corners<R> {
         let zero = [R::from_f64(0.0); 3];

@@ -1,9 +1,8 @@
-//! Contact of beams with beams: every step the forces of the pairs that touch (see [`super::pairs`]), from the line of one thread
-//! integrated over that of the other (see [`super::segments`] and [`super::arc_offset`]), with damping and friction at the point where
-//! these act.
+//! Contact of beams with beams: every step the forces of the touching pairs (see [`super::pairs`]), from the integral over the
+//! lines of both threads (see [`super::segments`] and [`super::arc_offset`]), with damping and friction at the point of action.
 //!
-//! A pair with a gap is left alone until the gap can have closed, as in [`super::penalty`]: points of lines move at most as fast as
-//! nodes times the sum of their weights.
+//! A pair with a gap is skipped until the gap can have closed, as in [`super::penalty`]: points of lines move at most as fast
+//! as nodes times the sum of their absolute weights.
 
 use super::arc_offset::{self, Piece};
 use super::friction::slide;
@@ -24,9 +23,9 @@ use crate::kernel::vector::{add, apply, dot, fma, norm, scale, sub};
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
-/// Pairs that a beam can have.
+/// Largest number of pairs per beam.
 pub const MOST_PAIRS: usize = 64;
-/// Share of a beam below which the length that touches is not divided by.
+/// Lower bound of the touching length as a divisor, as a share of the beam length.
 const LEAST: f64 = 1e-6;
 
 /// The slots of [`Force`].
@@ -47,7 +46,7 @@ const FORCE: [Slot; 15] = joined(
 /// Contact forces of pairs of beams.
 pub struct Force<const FRICTION: bool, const PERIODIC: bool>;
 
-/// Two beams that touch: their nodes and weights, the penalty times their lengths, N/mm, and their pieces at rest.
+/// Two touching beams: their nodes and weights, the penalty times their lengths, N/mm, and their reference pieces.
 struct Pair<R> {
     nodes: [[usize; 4]; 2],
     weights: [[[R; 4]; 2]; 2],
@@ -66,7 +65,7 @@ impl<R: Real> Pair<R> {
         })
     }
 
-    /// Adds forces on the ends of both pieces to their nodes, in integers whose sum is zero.
+    /// Adds forces on the ends of both pieces to their nodes, as integers whose sum is zero.
     #[inline(always)]
     fn add_forces(&self, forces: &[AtomicI32], status: &[AtomicU32], quantum: R, push: &Push<R>) {
         let mut rest = [0i32; 3];
@@ -100,7 +99,7 @@ impl<R: Real> Pair<R> {
     }
 }
 
-/// What pairs that touch read and write.
+/// Inputs and sums of touching pairs.
 struct Touch<'a, R, const FRICTION: bool, const PERIODIC: bool> {
     scene: Scene<'a, R, PERIODIC>,
     row: &'a Row<R>,
@@ -110,10 +109,10 @@ struct Touch<'a, R, const FRICTION: bool, const PERIODIC: bool> {
     stiffness: &'a [AtomicI32],
     flags: &'a [AtomicU32],
     params: Params,
-    /// Distance at which threads touch, mm, and its increment since the step before.
+    /// Distance at which threads touch, mm, and its increment since the previous step.
     reach: R,
     growth: R,
-    /// Time since the step before, s.
+    /// Time since the previous step, s.
     elapsed: R,
 }
 
@@ -142,7 +141,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
         }
     }
 
-    /// Lets gaps close, and tells whether one of a beam's pairs can touch.
+    /// Reduces the gap counters, and tells whether one of a beam's pairs can touch.
     #[inline(always)]
     fn can_touch(&self, beam: usize, keys: &[u32], states: &mut [R]) -> bool {
         let zero = R::from_f64(0.0);
@@ -158,20 +157,21 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
         can_touch
     }
 
-    /// Length at rest of a beam, mm.
+    /// Reference length of a beam, mm.
     #[inline(always)]
     fn length(&self, beam: usize) -> R {
         self.scene.beams[TABLE * beam + 3]
     }
 
-    /// Tangential stiffness of a beam's pairs, N/mm: that of a contact as long as the beam, or as a thread is thick.
+    /// Tangential stiffness of a beam's pairs, N/mm, for a contact length equal to the beam length or the thread diameter,
+    /// whichever is less.
     #[inline(always)]
     fn tangential(&self, beam: usize) -> R {
         let thick = real::<R>(2.0 * self.params.thread_radius);
         real::<R>(self.params.thread_thread) * self.length(beam).min(thick) * real(self.params.tangential)
     }
 
-    /// Lets go of what friction holds.
+    /// Releases the elastic tangential displacement of friction.
     #[inline(always)]
     fn release(&self, beam: usize, state: &mut [R], sum: &mut [R]) {
         if FRICTION {
@@ -181,7 +181,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
         }
     }
 
-    /// Forces of a beam, whose piece is known, and another one; whether they touch.
+    /// Forces between a known beam piece and another beam; whether they touch.
     #[inline(always)]
     fn pair(&self, beam: usize, own: &Piece<R>, key: u32, state: &mut [R], sum: &mut [R]) -> bool {
         let zero = R::from_f64(0.0);
@@ -226,15 +226,16 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
         true
     }
 
-    /// Adds damping, and friction of a stiffness `tangential` (N/mm), to an elastic force of size `pressed` (N), at the point where it acts.
+    /// Adds damping, and friction of stiffness `tangential` (N/mm), to an elastic force of size `pressed` (N), at its point of
+    /// action.
     ///
-    /// Damping is a share of what is critical for the lengths that touch, with the penalty and their own mass: as much a length of contact
-    /// in any mesh, and sure not to turn the velocity. A node has half of its mass on either side.
+    /// Damping is a share of the critical value for the touching lengths, with their penalty and mass: it is the same per
+    /// contact length in any mesh, and it cannot reverse the velocity. A node has half of its mass on either side.
     ///
-    /// Damping asks for the velocity in the middle of a step, and knows that of half a step before. It lies between that one, as where other
-    /// forces hold the contact in balance, and the one after half a step of the elastic force alone, as where bodies fly freely. The smaller
-    /// of both is taken, and none if they differ in sign, so that no contact gains energy however few steps it lasts. What is lost is
-    /// noted with the mean of both.
+    /// Damping requires the velocity in the middle of a step, but only the velocity half a step earlier is known. The true
+    /// value lies between that velocity (other forces hold the contact in equilibrium) and the velocity after half a step of
+    /// the elastic force alone (free flight). The smaller of the two in magnitude is used, and zero if their signs differ, so
+    /// that no contact gains energy however few steps it lasts. The dissipation is computed with the mean of both.
     #[inline(always)]
     fn resist(&self, pair: &Pair<R>, pressed: R, tangential: R, push: &mut Push<R>, state: &mut [R], sum: &mut [R]) {
         let (zero, one, half) = (R::from_f64(0.0), R::from_f64(1.0), R::from_f64(0.5));

@@ -1,5 +1,5 @@
-//! Ties: a node that is held at a point of another body's surface by a spring, for cut threads whose ends stay caught between the
-//! fibres. The spring pulls on the difference of displacements, hence not at the start.
+//! Ties: springs that hold a node at a point of another body's surface, for cut threads whose ends stay caught between the
+//! fibres. The spring acts on the difference of displacements, so it is free of force at the start.
 
 use super::{Params, add_pair, add_stiffness, status};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
@@ -12,9 +12,9 @@ use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{dot, fma, scale};
 use std::ops::Range;
 
-/// Nodes of a tie: the one that is held, and the corners of the face that holds it.
+/// Nodes of a tie: the tied node, and the corners of the face.
 const NODES: usize = 5;
-/// Numbers of a tie: weights of the corners; stiffness, N/mm.
+/// Numbers per tie: weights of the corners; stiffness, N/mm.
 const VALUES: usize = 5;
 
 /// Forces of ties.
@@ -30,7 +30,7 @@ impl Kernel for Tie {
         Slot::read("values", Scalar),
         Slot::read("quanta", Int),
         Slot::read("remainder", Scalar),
-        // elastic, now, mJ
+        // current elastic energy, mJ
         Slot::row("energies", Scalar, 1),
         Slot::atomic("forces", Int),
         Slot::atomic("stiffness", Int),
@@ -53,7 +53,7 @@ impl Kernel for Tie {
             let held = nodes[0] as usize;
             let corners = [0, 1, 2, 3].map(|a| (nodes[a + 1] as usize, values[a]));
             let spring = values[4];
-            // from the held node to its place on the face
+            // from the tied node to its point on the face
             let mut gap = [constant(0.0); 3];
             for (node, weight) in corners {
                 gap = fma(displacement.between(node, held), weight, gap);

@@ -1,12 +1,12 @@
-//! Accelerations: each node gathers its corner slots in a fixed order, adds contact and its weight, and divides by its mass.
+//! Accelerations: each node gathers its corner slots in a fixed order, adds contact forces and weight, and divides by its mass.
 //!
-//! Gravity pulls on the true mass alone, not on what the mass floor, a least limit or contact adds: a body at rest presses with its
-//! weight.
+//! Gravity acts on the true mass only, not on mass added by the mass floor, a minimum time step or contact: a body at rest
+//! presses with its true weight.
 //!
-//! With contact-aware mass, a node in contact is as heavy as a stable step needs, m ≥ dt²/4 · K, with K the row sum of the
-//! stiffness of contact and of elements at the node; what was added fades once contact is lost. A least limit of the step does the
-//! same for elements alone: a few slivers at cut edges need not hold up a scene. Without contact-aware mass, the largest K/m of
-//! contact is reported for the choice of the time step.
+//! With contact-aware mass scaling, a node in contact has at least the mass of a stable step, m ≥ dt²/4 · K, with K the row sum
+//! of the stiffness of contact and elements at the node; added mass decays once contact is lost. A minimum time step does the
+//! same for elements alone, so that a few slivers at cut edges do not limit a scene. Without contact-aware mass scaling, the
+//! largest K/m of contact is reported for the choice of the time step.
 
 use crate::contact::status::{self, CONTACT_RATE};
 use crate::elements::{self, LANES};
@@ -18,15 +18,15 @@ use crate::kernel::stage::{Io, Kernel, raise};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
-/// Corner slots a solid node gathers.
+/// Corner slots gathered by a solid node.
 pub const SOLID: usize = 8;
-/// Slots a thread node gathers: two beams.
+/// Slots gathered by a thread node: two beams.
 pub const THREAD: usize = 2;
-/// And with bending: three bends, as first, middle and last node.
+/// Additional slots with bending: three bends, as first, middle and last node.
 pub const BENT: usize = 3;
-/// Nothing to gather.
+/// An empty slot.
 pub const NONE: u32 = u32::MAX;
-/// What twins know of the slots of nodes.
+/// Constants of nodal slots shared with the twins.
 pub const CONSTANTS: [Constant; 4] = constants![uint: SOLID, THREAD, BENT, NONE];
 
 /// Constants of the stage.
@@ -35,22 +35,22 @@ pub const CONSTANTS: [Constant; 4] = constants![uint: SOLID, THREAD, BENT, NONE]
 pub struct Params {
     /// First node of a thread.
     pub first_thread: u32,
-    /// Size of a unit of contact force, N.
+    /// Quantum of contact force, N.
     pub force_quantum: f32,
-    /// Size of a unit of contact stiffness, N/mm.
+    /// Quantum of contact stiffness, N/mm.
     pub stiffness_quantum: f32,
-    /// Factor on the mass that contact calls for.
+    /// Factor on the mass required by contact.
     pub mass_factor: f32,
     /// Share of added mass kept per step.
     pub mass_memory: f32,
-    /// Least mass for the stiffness of elements, s²: a quarter of the square of the least limit of the time step.
+    /// Minimum nodal mass per element stiffness, s²: a quarter of the square of the minimum time step.
     pub mass_per_stiffness: f32,
     /// Gravity, mm/s².
     pub gravity: [f32; 3],
 }
 
-/// Assembly; with `CONTACT` contact forces, with `MASS_ADDED` contact-aware mass, with `BENDING` bends of threads, with `GRAVITY`
-/// weight.
+/// Assembly; with `CONTACT` contact forces, with `MASS_ADDED` contact-aware mass scaling, with `BENDING` bends of threads, with
+/// `GRAVITY` weight.
 pub struct Assemble<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRAVITY: bool>;
 
 impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRAVITY: bool> Kernel
@@ -80,9 +80,9 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
         Slot::read("true_mass", Scalar).when(GRAVITY),
         // mm/s²
         Slot::planes("acceleration", Scalar, 3),
-        // of the mass that acts, 1/tonne
+        // inverse of the effective mass, 1/tonne
         Slot::row("inverse_mass", Scalar, 1),
-        // in quanta, set back to zero
+        // in quanta, reset to zero
         Slot::planes("contact_force", Int, 3).when(CONTACT),
         Slot::row("contact_stiffness", Int, 1).when(CONTACT),
         // tonne

@@ -1,4 +1,4 @@
-//! Energies that no force computes: kinetic energy, and that of stretched threads, as [totals](super::totals).
+//! Energies not computed with the forces: kinetic energy, and strain energy of stretched threads, as [totals](super::totals).
 
 use super::totals::{add_up, part};
 use crate::elements::beam2::{self, TABLE};
@@ -17,22 +17,22 @@ use std::ops::Range;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct Params {
-    /// Nodes or beams.
+    /// Number of nodes or beams.
     pub count: u32,
-    /// Of them in a part.
+    /// Items per part.
     pub length: u32,
-    /// Where the sums of the parts start.
+    /// Start of the sums of the parts.
     pub into: u32,
-    /// Centre of mass in the reference, in quanta.
+    /// Reference centre of mass, in quanta.
     pub centre: [i32; 3],
 }
 
-/// ½ Σ m v²; with `TOTAL`, v includes the affine motion Ḟ̄ (X − X_c), seen from the centre of mass.
+/// ½ Σ m v²; with `TOTAL`, v includes the affine motion Ḟ̄ (X − X_c) relative to the centre of mass.
 pub struct Kinetic<const TOTAL: bool>;
 
 impl<const TOTAL: bool> Kernel for Kinetic<TOTAL> {
     const SHADER: Shader = Shader {
-        // only a periodic cell deforms as a whole
+        // only a periodic cell has a macroscopic deformation
         defines: &[when(TOTAL, "TOTAL"), when(TOTAL, "PERIODIC")],
         share: Share::Workgroups(1),
         constants: &[&position::CONSTANTS],

@@ -1,17 +1,17 @@
-//! Fibre-line selective mass scaling: lifts the limit that the axial stiffness of fibres and threads sets on the time step.
+//! Fibre lines: selective mass scaling that lifts the time step limit set by the axial stiffness of fibres and threads.
 //!
-//! The mass matrix becomes A = M + β dt² Σ k_s b_s b_sᵀ over the segments s of a line, with b_s = (−d_s, +d_s) on the segment's two
-//! nodes, d_s its current direction and k_s its axial stiffness. Forces stay as they are, so every static answer is the same;
-//! translations are in the null space of the added part, so momentum is kept and rigid slip is not resisted. By the
-//! Woodbury identity the accelerations a = M⁻¹f of a line are corrected by Σ p_s b_s/m, where p solves a symmetric positive definite
-//! tridiagonal system, cyclic for a line that closes through the periodic cell:
+//! The mass matrix becomes A = M + β dt² Σ k_s b_s b_sᵀ over the segments s of a line, with b_s = (−d_s, +d_s) on the segment's
+//! two nodes, d_s its current direction and k_s its axial stiffness. The forces are unchanged, so every static solution is the
+//! same. Translations are in the null space of the added part, so momentum is conserved and rigid slip is not resisted. By the
+//! Woodbury identity the accelerations a = M⁻¹f of a line are corrected by Σ p_s b_s/m, where p solves a symmetric positive
+//! definite tridiagonal system, cyclic for a line that closes through the periodic cell:
 //!
 //! diagonal 1/(β dt² k_s) + 1/m_s + 1/m_{s+1}, off-diagonal −d_s·d_{s+1}/m_{s+1}, right side −d_s·(a_{s+1} − a_s).
 //!
-//! The laws of fibres are logarithmic: at a stretch λ < 1 their stiffness is (1 − ln λ)/λ² times that at rest, and k_s grows by
-//! λ⁻⁴, which is more than that.
+//! The fibre laws are logarithmic: at a stretch λ < 1 their stiffness is (1 − ln λ)/λ² times the stiffness at rest. k_s grows
+//! by λ⁻⁴, which is more.
 //!
-//! The sweep runs along a group of up to sixteen lines at once, one line a lane. The WGSL twin gives each line a workgroup and
+//! The sweep solves a group of up to sixteen lines at once, one line per lane. The WGSL twin gives each line a workgroup and
 //! solves the same system, bordered by its last row, by parallel cyclic reduction.
 
 use crate::elements::{self, LANES};
@@ -31,24 +31,24 @@ use std::ops::Range;
 pub struct Group {
     /// First node of the first line.
     pub first: u32,
-    /// Lines, at most sixteen.
+    /// Number of lines, at most sixteen.
     pub lines: u32,
-    /// Nodes of a line.
+    /// Nodes per line.
     pub stations: u32,
-    /// 1 if the last node is followed by the first.
+    /// 1 if the first node follows the last, else 0.
     pub closed: u32,
-    /// Image shift of the first node as it follows the last, in quanta along x and y.
+    /// Image shift of the first node when it follows the last, in quanta along x and y.
     pub shift: [i32; 2],
 }
 
-/// Integers of a group in the table.
+/// Integers per group in the table.
 const GROUP: usize = size_of::<Group>() / 4;
 
 /// Constants of the stage.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct Params {
-    /// Strength β of the added inertia.
+    /// Strength β of the added mass.
     pub beta: f32,
 }
 
@@ -65,15 +65,15 @@ const SLOTS: [Slot; 8] = [
     Slot::scatter("correction", Scalar),
 ];
 
-/// The correction of accelerations; with `PERIODIC` lines deform with F̄ and may close through the cell.
+/// The correction of accelerations; with `PERIODIC`, lines deform with F̄ and may close through the cell.
 pub struct FibreLines<const PERIODIC: bool>;
 
 thread_local! {
-    /// Working memory of a sweep; f64 for its alignment and size.
+    /// Work space of a sweep; f64 for its alignment and size.
     static SCRATCH: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Rows of working memory of a station.
+/// Rows of work space per station.
 const DIRECTION: usize = 0;
 const RESPONSE: usize = 3;
 const INVERSE: usize = 6;
@@ -86,7 +86,7 @@ const ROWS: usize = 11;
 impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
     const SHADER: Shader = Shader {
         defines: &[when(PERIODIC, "PERIODIC")],
-        // a workgroup for each line
+        // one workgroup per line
         share: Share::Workgroups(LANES),
         constants: &[&elements::CONSTANTS, &position::CONSTANTS, &constants![uint: GROUP]],
         ..Shader::new("dynamics/fibre_lines", "fibre_lines")
@@ -96,7 +96,7 @@ impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let groups: &[Group] = bytemuck::cast_slice(io.uints(slot!(&SLOTS, "groups")));
-        // taken out rather than borrowed in a closure, which would not be compiled for the instruction set
+        // taken, not borrowed in a closure, because the closure would not be compiled for the instruction set
         let mut memory = SCRATCH.take();
         for group in items {
             let group = groups[group];
@@ -112,13 +112,13 @@ impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
     }
 }
 
-/// Place of a row of a station in working memory.
+/// Index of a row of a station in the work space.
 #[inline(always)]
 fn place(station: usize, row: usize) -> usize {
     (station * ROWS + row) * LANES
 }
 
-/// Brings segment vectors, accelerations and inverse masses into working memory, one line a lane.
+/// Loads segment vectors, accelerations and inverse masses into the work space, one line per lane.
 #[inline(always)]
 fn gather<L: Lane, const PERIODIC: bool>(io: &Io<L::Scalar>, group: &Group, scratch: &mut [L::Scalar]) {
     let reference = io.ints(slot!(&SLOTS, "reference"));
@@ -136,7 +136,7 @@ fn gather<L: Lane, const PERIODIC: bool>(io: &Io<L::Scalar>, group: &Group, scra
             let (next, shift) = match (i + 1 < n, group.closed == 1) {
                 (true, _) => (here + 1, [0, 0]),
                 (false, true) => (first, group.shift),
-                // an open line has no last segment: any other with a length stands in its place
+                // an open line has no last segment: any other segment of nonzero length takes its place
                 (false, false) => (here - 1, [0, 0]),
             };
             let shift = if PERIODIC { [shift[0], shift[1], 0] } else { [0; 3] };
@@ -165,7 +165,7 @@ fn gather<L: Lane, const PERIODIC: bool>(io: &Io<L::Scalar>, group: &Group, scra
     }
 }
 
-/// One register of lines in working memory.
+/// One register of lines in the work space.
 struct Sweep<'a, R> {
     scratch: &'a mut [R],
     lane: usize,
@@ -191,7 +191,7 @@ fn dot<L: Lane>(a: [L; 3], b: [L; 3]) -> L {
     a[2].fma(b[2], a[1].fma(b[1], a[0] * b[0]))
 }
 
-/// Sets up and solves the systems of one register of lines; leaves the corrections in the rows of the accelerations.
+/// Sets up and solves the systems of one register of lines; the corrections replace the accelerations in their rows.
 #[inline(always)]
 fn solve<L: Lane>(io: &Io<L::Scalar>, group: &Group, s: &mut Sweep<L::Scalar>) {
     let Params { beta } = io.params();
@@ -222,7 +222,7 @@ fn solve<L: Lane>(io: &Io<L::Scalar>, group: &Group, s: &mut Sweep<L::Scalar>) {
         s.set(i, COUPLING, -(dot(a, b) * inverse));
     }
     if group.closed == 0 {
-        // there is no last segment
+        // no last segment
         s.set(n - 1, DIAGONAL, one);
         s.set(n - 1, RIGHT, zero);
         s.set(n - 1, COUPLING, zero);

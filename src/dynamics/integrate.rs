@@ -1,8 +1,8 @@
-//! Central differences, with mass-proportional damping if the scene has any. In a periodic cell the unknown is the fluctuation w
-//! of x = F̄X + w, and damping acts on its velocity only.
+//! Time integration by central differences, with mass-proportional damping if the scene has any. In a periodic cell the unknown
+//! is the fluctuation w of x = F̄X + w, and damping acts on its velocity only.
 //!
-//! v⁺ = ((1 − α dt/2) v⁻ + a dt)/(1 + α dt/2), then w⁺ = w + v⁺ dt. Work is taken with the mean velocity (v⁻ + v⁺)/2, for which
-//! the change of kinetic energy is exactly the work of all forces. Only what a scene has is computed, and its work kept.
+//! v⁺ = ((1 − α dt/2) v⁻ + a dt)/(1 + α dt/2), then w⁺ = w + v⁺ dt. Work is computed with the mean velocity (v⁻ + v⁺)/2, so the
+//! change of kinetic energy is exactly the work of all forces. Only active effects are computed and their work recorded.
 
 use crate::kernel::buffer::Kind::{Int, Scalar};
 use crate::kernel::interface::{Slot, constants, slot};
@@ -23,10 +23,10 @@ pub struct Params {
     pub gravity: [f32; 3],
 }
 
-/// What changes the energy of nodes as they are integrated. Each has a plane in the work buffer, in this order.
+/// Kinds of work on nodes during integration. Each has a plane in the work buffer, in this order.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Works {
-    /// Loss by damping.
+    /// Energy lost to damping.
     pub damping: bool,
     /// Work of fibre lines and of added mass.
     pub inertia: bool,
@@ -34,7 +34,7 @@ pub struct Works {
 }
 
 impl Works {
-    /// Planes of the works that there are.
+    /// Planes of the active kinds.
     pub const fn planes(self) -> [Option<usize>; 3] {
         const fn plane(is_there: bool, number: usize) -> Option<usize> {
             if is_there { Some(number) } else { None }
@@ -43,24 +43,24 @@ impl Works {
         [plane(self.damping, 0), plane(self.inertia, inertia), plane(self.gravity, gravity)]
     }
 
-    /// Planes before that of inertia.
+    /// Number of planes before the inertia plane.
     const fn before_inertia(self) -> usize {
         self.damping as usize
     }
 
-    /// Planes before that of gravity.
+    /// Number of planes before the gravity plane.
     const fn before_gravity(self) -> usize {
         self.damping as usize + self.inertia as usize
     }
 
-    /// How many there are.
+    /// Number of active kinds.
     pub const fn count(self) -> usize {
         self.damping as usize + self.inertia as usize + self.gravity as usize
     }
 }
 
-/// Integration; with `LINES`, the correction of fibre lines is added first; with `GRAVITY` the work of weight is kept; with
-/// `MASS_ADDED` the mass that acts may be more than that of the node.
+/// Integration; with `LINES`, the correction of fibre lines is added first; with `GRAVITY`, the work of the weight is recorded;
+/// with `MASS_ADDED`, the effective mass may exceed the nodal mass.
 pub struct Integrate<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADDED: bool>;
 
 impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADDED: bool>
@@ -69,7 +69,7 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
     const WORKS: Works = Works { damping: DAMPING, inertia: LINES || MASS_ADDED, gravity: GRAVITY };
 }
 
-/// Nodes that are integrated together, so that the loops over each axis fill registers.
+/// Nodes integrated together, so that the loops over each axis fill registers.
 const BLOCK: usize = 64;
 
 /// Factors on the old velocity and on the acceleration.
@@ -111,7 +111,7 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
         Slot::planes("velocity", Scalar, 3),
         Slot::planes("quanta", Int, 3),
         Slot::planes("remainder", Scalar, 3),
-        // mJ, a plane each, see [`Works`]
+        // work, mJ, one plane per kind, see [`Works`]
         Slot::planes("work", Scalar, Self::WORKS.count()).when(Self::WORKS.count() > 0),
     ];
 
@@ -143,7 +143,7 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
                 let count = BLOCK.min(nodes.end - first);
                 let mass = if works.count() > 0 { &masses[first..][..count] } else { &[] };
                 let heavy = if GRAVITY { &true_masses[first..][..count] } else { &[] };
-                // what acts beyond the mass of each node, and works, summed over the axes
+                // effective mass beyond the nodal mass, and works summed over the axes
                 let [mut extra, mut damped, mut inertia, mut fallen] = [[zero; BLOCK]; 4];
                 if MASS_ADDED {
                     for ((extra, inverse), mass) in extra.iter_mut().zip(&inverse[first..][..count]).zip(mass) {

@@ -1,22 +1,22 @@
-//! The limit of the time step, node by node: a row-sum bound R of the stiffness that fibre lines leave gives dt ≤ 2 √(m/R).
+//! The limit of the time step, node by node: a row-sum bound R of the stiffness not covered by fibre lines gives dt ≤ 2 √(m/R).
 //!
-//! With the mass matrix A = M + β dt² K_l of fibre lines, a step is stable while dt² K ≤ 4 A. Let K ≤ 4β K_l + R: then dt² R ≤ 4 M
-//! is enough, and by Gershgorin's theorem R may be the diagonal of row sums. K_l along the lines is part of the stiffness of
-//! fibres, all of it where the edges of an element are parallel: the stiffness of a fibre along d, (d·e)² for the difference e
-//! of displacements along an edge, is at most 4β times the part along the edge and 4β/(4β − 1) times the part across it. R holds
-//! that part across, the stiffness of the section, longitudinal shear, the tension of fibres and threads, and bending.
+//! With the mass matrix A = M + β dt² K_l of fibre lines, a step is stable while dt² K ≤ 4 A. If K ≤ 4β K_l + R, then dt² R ≤ 4
+//! M is sufficient, and by Gershgorin's theorem R may be the diagonal matrix of row sums. K_l is the part of the fibre
+//! stiffness along the lines, all of it if the edges of an element are parallel. The stiffness of a fibre along d, (d·e)² for
+//! the difference e of displacements along an edge, is at most 4β times its part along the edge plus 4β/(4β − 1) times its part
+//! across the edge. R contains this part across, the stiffness of the section, longitudinal shear, the tension of fibres and
+//! threads, and bending.
 //!
-//! A node that is light between heavy ones, as at the rim of a yarn, swings by itself, and its row sum counts the pull of
-//! neighbours that do not. For any weights v > 0, ω² is at most the largest Σ|K_ab| v_b / (m_a v_a) (Collatz and Wielandt);
-//! with v = R/m that is the mean of R/m of a node's neighbours and itself, by |K_ab|. It is never more than the largest
-//! R/m.
+//! A light node between heavy ones, as at the rim of a yarn, vibrates by itself, but its row sum includes the coupling to
+//! neighbours that do not. For any weights v > 0, ω² is at most the largest Σ|K_ab| v_b / (m_a v_a) (Collatz and Wielandt).
+//! With v = R/m this is the mean of R/m over a node and its neighbours, weighted by |K_ab|. It never exceeds the largest R/m.
 //!
-//! Rows that masses are made heavier for (see [`super::assemble`]) are not weighed: a mass would count in its own weight.
+//! Rows with mass scaling (see [`super::assemble`]) are not weighed: a mass would count in its own weight.
 //!
-//! Mass that contact has added counts: it goes slower than the limit is looked at again. What contact itself calls for is
-//! covered by it, see [`super::assemble`].
+//! Mass added by contact counts: it decays more slowly than the limit is updated. The stiffness of contact itself is covered by
+//! it, see [`super::assemble`].
 //!
-//! A bend of energy S (T − T₀)², T = tan(θ/2), is (1 + T²)(1 + T² + 2 T (T − T₀)) times as stiff as one that is straight. T comes
+//! A bend of energy S (T − T₀)², T = tan(θ/2), is (1 + T²)(1 + T² + 2 T (T − T₀)) times as stiff as a straight one. T follows
 //! from its force on a beam of length l, S (T − T₀)(1 + T²)/l, and its energy.
 
 use super::assemble::{self, BENT, NONE, SOLID, THREAD};
@@ -37,16 +37,16 @@ use std::ops::Range;
 pub struct Params {
     /// First node of a thread.
     pub first_thread: u32,
-    /// See [`super::assemble::Params`]: mass that is added for the stiffness of elements counts.
+    /// See [`super::assemble::Params`]: mass added for the stiffness of elements counts.
     pub mass_per_stiffness: f32,
     /// 1 if no fibre lines go along threads, 0 if they do.
     pub axial: f32,
 }
 
-/// What row sums are assembled from, with `bending` also that of bends.
+/// Inputs of the row sums; with `bending` also those of bends.
 const fn rows(bending: bool) -> [Slot; 11] {
     [
-        // for each solid node, where its corner bounds are
+        // for each solid node, the indices of its corner bounds
         Slot::read("solid_bounds", Uint),
         Slot::read("hex_bound", Scalar),
         // axial stiffness of closed lines that are too short for fibre lines, N/mm
@@ -61,10 +61,10 @@ const fn rows(bending: bool) -> [Slot; 11] {
         Slot::read("bend_rows", Scalar).when(bending),
     ]
 }
-/// Numbers of a bend's row sums: of its three nodes while it is straight, N/mm; length of its first beam, mm.
+/// Numbers per bend in its row sums: row sums of its three nodes while straight, N/mm; length of its first beam, mm.
 pub const ROWS: usize = 4;
 
-/// Factor on the part across of fibres, for lines of strength β.
+/// Factor on the fibre stiffness across the edge, for lines of strength β.
 pub fn left(beta: f64) -> f64 {
     4.0 * beta / (4.0 * beta - 1.0).max(0.01)
 }
@@ -72,11 +72,11 @@ pub fn left(beta: f64) -> f64 {
 /// Difference of T and T₀ below which they count as equal.
 const AT_REST: f64 = 1e-3;
 
-/// What the twin takes from Rust.
+/// Constants shared with the twin.
 const CONSTANTS: &[&[Constant]] =
     &[&beam2::CONSTANTS, &bend::CONSTANTS, &assemble::CONSTANTS, &constants![uint: ROWS; scalar: AT_REST]];
 
-/// How much stiffer a bend is than a straight one.
+/// Stiffness of a bend relative to a straight one.
 #[inline(always)]
 fn stiffening<R: Real>([stiffness, rest]: [R; 2], energy: R, force: R, length: R) -> R {
     let (zero, one) = (R::from_f64(0.0), R::from_f64(1.0));
@@ -88,7 +88,7 @@ fn stiffening<R: Real>([stiffness, rest]: [R; 2], energy: R, force: R, length: R
     square * (square + (t + t) * further)
 }
 
-/// Row sums of element stiffness of nodes.
+/// Row sums of the element stiffness at nodes.
 struct RowSums<'a, R> {
     first_thread: usize,
     axial: R,
@@ -101,7 +101,7 @@ struct RowSums<'a, R> {
     bends: Option<Bends<'a, R>>,
     weights: Option<Weights<'a, R>>,
 }
-/// What bends say of their stiffness.
+/// Stiffness data of bends.
 struct Bends<'a, R> {
     slots: &'a [u32],
     table: &'a [R],
@@ -109,7 +109,7 @@ struct Bends<'a, R> {
     force: &'a [R],
     rows: &'a [R],
 }
-/// What rows are weighed with: R/m of nodes, and the nodes of beams and bends.
+/// Weights of the rows: R/m of nodes, and the nodes of beams and bends.
 struct Weights<'a, R> {
     rates: &'a [R],
     ends: &'a [u32],
@@ -139,12 +139,12 @@ impl<'a, R: Real> RowSums<'a, R> {
         }
     }
 
-    /// The row sum of a node, weighed if there are weights: bounds of hexahedra are already.
+    /// The row sum of a node, weighed if there are weights; the bounds of hexahedra are already weighed.
     #[inline(always)]
     fn of(&self, node: usize) -> R {
         let size = |force: &[R]| norm([force[0], force[1], force[2]]);
         let one = R::from_f64(1.0);
-        // the nodes of short lines are alike
+        // the nodes of short lines have equal weights
         let mut k = self.constant[node] * self.weights.as_ref().map_or(one, |w| w.rates[node]);
         if node < self.first_thread {
             for &slot in self.slots[SOLID * node..][..SOLID].iter().filter(|slot| **slot != NONE) {
@@ -181,7 +181,7 @@ impl<R: Real> Weights<'_, R> {
         self.ends[2 * beam + end] as usize
     }
 
-    /// Mean over the nodes of a bend, by their rows.
+    /// Mean weight over the nodes of a bend, weighted by its row sums.
     #[inline(always)]
     fn mean(&self, bend: usize, rows: &[R]) -> R {
         let [first, second] = [self.pairs[2 * bend] as usize, self.pairs[2 * bend + 1] as usize];
@@ -190,11 +190,11 @@ impl<R: Real> Weights<'_, R> {
     }
 }
 
-/// Assembles the row sums of element stiffness, with those of bends: N/mm, and R/m, 1/s² (2 planes).
+/// Assembles the row sums of the element stiffness, including bends: N/mm, and R/m, 1/s² (2 planes).
 pub struct ElementLimit<const BENDING: bool, const MASS_ADDED: bool>;
-/// Leaves out nodes that are held altogether: they do not swing.
+/// Excludes fully prescribed nodes, which do not vibrate.
 pub struct HeldLimit;
-/// The mean of R/m around each node, 1/s².
+/// The weighted mean of R/m over each node and its neighbours, 1/s².
 pub struct WeighedLimit<const BENDING: bool>;
 
 impl<const BENDING: bool, const MASS_ADDED: bool> Kernel for ElementLimit<BENDING, MASS_ADDED> {
@@ -256,7 +256,7 @@ impl<const BENDING: bool> Kernel for WeighedLimit<BENDING> {
         let mut out = io.own::<L::Scalar>(slot!(Self::SLOTS, "out"));
         let zero = L::Scalar::from_f64(0.0);
         for node in items {
-            // nodes that are held stay out
+            // fully prescribed nodes are excluded
             *out.at(0, node) = if rates[node] > zero { rows.of(node) / sums[node] } else { zero };
         }
     }
@@ -277,7 +277,7 @@ impl Kernel for HeldLimit {
     }
 }
 
-/// Largest stable step for R/m in 1/s².
+/// Largest stable time step, s, for R/m in 1/s².
 pub fn limit<R: Real>(stiffness_over_mass: R) -> f64 {
     2.0 / libm::sqrt(stiffness_over_mass.to_f64().max(1e-300))
 }

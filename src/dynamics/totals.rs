@@ -1,9 +1,8 @@
-//! Totals: columns of numbers added up, and the worst of them, part by part, so that the host reads a few numbers instead of
-//! one for every item.
+//! Totals: sums and maxima of columns, part by part, so that the host reads a few numbers instead of one per item.
 //!
-//! A part is a range of a column whose length depends only on that of the column. A workgroup works on a part: each of its
-//! invocations takes every 64th number, then the upper half is added to the lower until one sum is left. The CPU keeps the
-//! same sums side by side. The host adds the parts in f64.
+//! A part is a range of a column; its length depends only on the length of the column. A workgroup works on a part: each
+//! invocation sums every 64th number, then the upper half is added to the lower until one sum is left. The CPU keeps the same
+//! partial sums side by side. The host adds the parts in f64.
 
 use crate::elements::{self, LANES};
 use crate::kernel::buffer::Kind::{Scalar, Uint};
@@ -14,38 +13,38 @@ use crate::kernel::stage::{Io, Kernel};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
-/// Constants of the stage: which numbers belong to a column.
+/// Constants of the stage: the numbers that belong to a column.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct Params {
     /// First number of the first column.
     pub start: u32,
-    /// Numbers of a column.
+    /// Numbers per column.
     pub count: u32,
-    /// How many of them lie side by side.
+    /// Number of them that are adjacent.
     pub lanes: u32,
-    /// From the first of these to the first of the next.
+    /// Stride from the first of these to the first of the next group.
     pub stride: u32,
-    /// Columns; each starts behind the lanes of the one before.
+    /// Number of columns; each starts after the lanes of the previous one.
     pub columns: u32,
-    /// Numbers of a part.
+    /// Numbers per part.
     pub length: u32,
-    /// Where the results of the stage start.
+    /// Start of the results of the stage.
     pub into: u32,
 }
 
-/// The smallest part that is worth a workgroup.
+/// The shortest part for which a workgroup pays.
 const SHORTEST: usize = 1024;
-/// The most parts of a column.
+/// The largest number of parts of a column.
 const MOST: usize = 256;
 
-/// Length of the parts of a column of `count` numbers, and how many they are.
+/// Length and number of the parts of a column of `count` numbers.
 pub fn parts(count: usize) -> (usize, usize) {
     let length = count.div_ceil(MOST).max(SHORTEST).next_multiple_of(WORKGROUP);
     (length, count.div_ceil(length))
 }
 
-/// Numbers of a part.
+/// Range of numbers of a part.
 #[inline(always)]
 pub fn part(number: usize, length: u32, count: u32) -> Range<usize> {
     let first = number * length as usize;
@@ -70,10 +69,10 @@ pub fn add_up<R: Real>(part: Range<usize>, mut term: impl FnMut(usize) -> R) -> 
     sums[0]
 }
 
-/// Below every value: what the worst of nothing is.
+/// Below every value: the maximum of an empty set.
 const LOWEST: f64 = -1e30;
 
-/// The largest value of a part, and its place there; of equal ones the first.
+/// The largest value of a part, and its index there; the first of equal ones.
 #[inline(always)]
 fn largest<R: Real>(part: Range<usize>, value: impl Fn(usize) -> R) -> (R, usize) {
     let mut found = [(R::from_f64(LOWEST), 0); WORKGROUP];
@@ -89,7 +88,7 @@ fn largest<R: Real>(part: Range<usize>, value: impl Fn(usize) -> R) -> (R, usize
 }
 
 impl Params {
-    /// Where a number of a column is.
+    /// Index of a number of a column.
     #[inline(always)]
     fn place(&self, number: usize, column: usize) -> usize {
         let lanes = self.lanes as usize;
@@ -97,7 +96,7 @@ impl Params {
     }
 }
 
-/// Sums of columns, the columns of a part side by side; with `TAKEN` the numbers are set back to zero.
+/// Sums of columns, with the columns of a part side by side; with `TAKEN` the numbers are reset to zero.
 pub struct Sum<const TAKEN: bool>;
 
 impl<const TAKEN: bool> Kernel for Sum<TAKEN> {
@@ -136,10 +135,10 @@ impl<const TAKEN: bool> Kernel for Sum<TAKEN> {
     }
 }
 
-/// Numbers that [`Worst`] leaves for a part.
+/// Numbers that [`Worst`] writes per part.
 pub const WORST: usize = 2;
 
-/// The largest number of a column, and its place in the part; with `JACOBIAN` the largest of −det F in lanes that are in use.
+/// The largest number of a column, and its index in the part; with `JACOBIAN` the largest −det F in lanes in use.
 pub struct Worst<const JACOBIAN: bool>;
 
 impl<const JACOBIAN: bool> Kernel for Worst<JACOBIAN> {
@@ -151,7 +150,7 @@ impl<const JACOBIAN: bool> Kernel for Worst<JACOBIAN> {
     };
     const SLOTS: &'static [Slot] = &[
         Slot::read("source", Scalar),
-        // of each block of hexahedra
+        // for each block of hexahedra
         Slot::read("lanes_used", Uint).when(JACOBIAN),
         Slot::scatter("totals", Scalar),
     ];

@@ -1,6 +1,6 @@
 //! Axial part of a 2-node beam: N = EA (l/L₀ − 1 − ε_th), with the additive thermal strain of Eq. 14 of Zheng et al.
 //!
-//! The strain is formed from the change of the beam's vector, ε = (2 D·δ + δ·δ)/(L₀ (l + L₀)) with d = D + δ, which keeps its
+//! The strain is computed from the change of the beam's vector, ε = (2 D·δ + δ·δ)/(L₀ (l + L₀)) with d = D + δ, which preserves
 //! relative accuracy at small strain.
 
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
@@ -13,17 +13,17 @@ use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{add, apply, dot, norm, scale};
 use std::ops::Range;
 
-/// Numbers of a beam in the table: vector D in mm (3), length L₀ in mm, EA in N.
+/// Numbers per beam in the table: vector D in mm (3), length L₀ in mm, EA in N.
 pub const TABLE: usize = 5;
 
-/// What twins know of beams.
+/// Constants of beams shared with the twins.
 pub const CONSTANTS: [Constant; 1] = constants![uint: TABLE];
 
-/// Axial forces; with `PERIODIC`, also their part of the homogenised stress; with `THERMAL`, of strained threads, also the
-/// thermal work −∫ N L₀ dε_th, mJ.
+/// Axial forces; with `PERIODIC`, also their virial for the homogenised stress; with `THERMAL`, for threads with thermal
+/// strain, also the thermal work −∫ N L₀ dε_th, mJ.
 pub struct Beam2<const PERIODIC: bool, const THERMAL: bool>;
 
-/// A beam's reference vector and its change, mm.
+/// The reference vector of a beam and its change, mm.
 #[inline(always)]
 pub fn vector<R: Real, const PERIODIC: bool>(
     table: &[R],
@@ -60,9 +60,9 @@ impl<const PERIODIC: bool, const THERMAL: bool> Kernel for Beam2<PERIODIC, THERM
         Slot::read("quanta", Int),
         Slot::read("remainder", Scalar),
         Slot::read("thermal_strain", Scalar).when(THERMAL),
-        // force along the beam, on its first node, N; the second node gets the opposite
+        // force along the beam on its first node, N; the second node gets the opposite force
         Slot::row("forces", Scalar, 3),
-        // axial force N, in N
+        // axial force N, N
         Slot::row("tensions", Scalar, 1),
         // sum of force ⊗ D over steps, N·mm
         Slot::row("virial", Scalar, 9).when(PERIODIC),

@@ -1,8 +1,8 @@
-//! Bending between two consecutive beams, without rotational unknowns: E = (2 EI/l̄)(T − T₀)², T = tan(θ/2) of the turning
-//! angle θ, l̄ the mean length of the two beams. T = |t₁ × t₂|/(1 + t₁·t₂) is smoothed to √(T² + T_ε²), since its gradient has no
-//! direction for a straight thread with a curved rest state. A bend that is straight at rest needs no smoothing, and must have
-//! none: it would lose its stiffness. Only the size of the rest curvature is kept, not its plane: a thread has no torsional
-//! stiffness here.
+//! Bending between two consecutive beams, without rotational degrees of freedom: E = (2 EI/l̄)(T − T₀)², T = tan(θ/2) of the
+//! turning angle θ, with l̄ the mean length of the two beams. T = |t₁ × t₂|/(1 + t₁·t₂) is smoothed to √(T² + T_ε²), since its
+//! gradient has no direction for a straight thread with a curved rest state. A bend that is straight at rest needs no smoothing
+//! and must not have it, because it would lose its stiffness. Only the magnitude of the rest curvature is kept, not its plane:
+//! a thread has no torsional stiffness here.
 
 use super::beam2::{self, TABLE, add_virial, vector};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
@@ -15,15 +15,15 @@ use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::vector::{add, cross, dot, norm, scale, sub};
 use std::ops::Range;
 
-/// Numbers of a bend in the table: 2 EI/l̄ in N·mm, smoothed rest value of T.
+/// Numbers per bend in the table: 2 EI/l̄ in N·mm, smoothed rest value of T.
 pub const BEND: usize = 2;
-/// Largest smoothing T_ε of tan(θ/2): 0.6 degrees of turning. It is at most half the smoothed rest value, so that the stiffness of a
-/// straightened bend is never below minus that of a straight one.
+/// Largest smoothing T_ε of tan(θ/2): a turning angle of 0.6 degrees. It is at most half the smoothed rest value, so that the
+/// stiffness of a straightened bend is never below minus the stiffness of a straight one.
 pub const SMOOTHING: f64 = 0.005;
-/// What twins know of bends.
+/// Constants of bends shared with the twins.
 pub const CONSTANTS: [Constant; 2] = constants![uint: BEND; scalar: SMOOTHING];
 
-/// Bending forces; with `PERIODIC`, also their part of the homogenised stress.
+/// Bending forces; with `PERIODIC`, also their virial for the homogenised stress.
 pub struct Bend<const PERIODIC: bool>;
 
 /// √(T² + T_ε²) of a rest value T, with T_ε the smaller of [`SMOOTHING`] and half the result.
@@ -38,14 +38,14 @@ impl<const PERIODIC: bool> Kernel for Bend<PERIODIC> {
         ..Shader::new("elements/bend", "force")
     };
     const SLOTS: &'static [Slot] = &[
-        // beams (2) of each bend
+        // the two beams of each bend
         Slot::read("pairs", Uint),
         Slot::read("bends", Scalar),
         Slot::read("ends", Uint),
         Slot::read("beams", Scalar),
         Slot::read("quanta", Int),
         Slot::read("remainder", Scalar),
-        // force along each of the two beams, on its first node, N (2 × 3); its second node gets the opposite
+        // force along each of the two beams on its first node, N (2 × 3); its second node gets the opposite force
         Slot::row("forces", Scalar, 6),
         // energy, mJ
         Slot::row("energies", Scalar, 1),
@@ -77,7 +77,7 @@ impl<const PERIODIC: bool> Kernel for Bend<PERIODIC> {
                 tangent[k] = scale(current, inverse[k]);
             }
             let cosine = dot(tangent[0], tangent[1]);
-            // a thread folded onto itself: tan(θ/2) ends at 10
+            // a thread folded onto itself: tan(θ/2) is limited to 10
             let opening = (constant(1.0) + cosine).max(constant(0.02));
             let turned = cross(tangent[0], tangent[1]);
             let smoothing = constant(SMOOTHING).min(constant(0.5) * rest);

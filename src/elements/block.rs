@@ -1,8 +1,8 @@
-//! What hexahedra share: blocks of sixteen lanes, displacements of their corners, the frame of the fibre, what is written.
+//! Common to all hexahedra: blocks of sixteen lanes, displacements of corners, the frame of the fibre, output slots.
 //!
-//! Hexahedra are stored in blocks of sixteen, lane by lane. Straight extruded yarns share few reference shapes, so a block
-//! names a *shape* (what the element keeps of the reference of its sixteen lanes) instead of keeping one. Displacements
-//! enter as differences to the first corner. Corner order in registers is binary, `i + 2 j + 4 k` for (ξ, η, ζ).
+//! Hexahedra are stored in blocks of sixteen, lane by lane. Straight extruded yarns have few different reference shapes, so a
+//! block refers to a *shape* (the reference data of its sixteen lanes) instead of storing its own. Displacements are relative
+//! to the first corner. Corner order in registers is binary, `i + 2 j + 4 k` for (ξ, η, ζ).
 
 use super::LANES;
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
@@ -16,27 +16,27 @@ use crate::materials::{self, Material, PARAMETERS, Tensor};
 use bytemuck::{Pod, Zeroable};
 use std::marker::PhantomData;
 
-/// Corner slots of a block: 8 corners × 3 components × lanes.
+/// Corner slots per block: 8 corners × 3 components × lanes.
 pub const SLOTS: usize = 24 * LANES;
-/// Numbers of a block's stress sum Σ w P, N·mm.
+/// Numbers per block of the virial stress sum Σ w P, N·mm.
 pub const VIRIAL: usize = 9 * LANES;
-/// Numbers of a block's energies by mode (4), mJ, and smallest Jacobian (1).
+/// Numbers per block of the energies by mode (4), mJ, and the smallest Jacobian (1).
 pub const ENERGY: usize = 5 * LANES;
-/// Numbers of a block's corner stiffness bounds, N/mm.
+/// Numbers per block of the corner stiffness bounds, N/mm.
 pub const BOUND: usize = 8 * LANES;
 
 /// Binary corner index of each corner in mesh order.
 pub const BINARY: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
 
-/// What twins know of blocks.
+/// Constants of blocks shared with the twins.
 pub const CONSTANTS: [Constant; 4] = constants![uint: SLOTS, VIRIAL, ENERGY, BOUND];
 
-/// What the element of a twin takes from Rust.
+/// The constants of an element shared with its twin.
 pub trait Element: 'static {
     const CONSTANTS: &'static [Constant];
 }
 
-/// The twin of a kernel of an element for a law, one lane an invocation.
+/// The twin of an element kernel for a material law, one lane per invocation.
 pub const fn shader<E: Element, M: Material, const PERIODIC: bool>(file: &'static str, kernel: &'static str) -> Shader {
     Shader {
         law: Some(M::SHADER),
@@ -57,7 +57,7 @@ pub const fn shader<E: Element, M: Material, const PERIODIC: bool>(file: &'stati
     }
 }
 
-/// The same for bounds, weighed or not.
+/// The twin of a bound kernel, weighed or not.
 pub const fn weighed_shader<E: Element, M: Material, const PERIODIC: bool, const WEIGHED: bool>(
     file: &'static str,
     kernel: &'static str,
@@ -68,7 +68,7 @@ pub const fn weighed_shader<E: Element, M: Material, const PERIODIC: bool, const
     }
 }
 
-/// What the kernels need to know of a block.
+/// Header of a block for the kernels.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable, PartialEq, Eq)]
 pub struct Header {
@@ -76,9 +76,9 @@ pub struct Header {
     pub material: u32,
     /// Row of the table of fibre frames.
     pub frame: u32,
-    /// Shape.
+    /// Index of the shape.
     pub shape: u32,
-    /// 1 if every corner's nodes are consecutive over the lanes.
+    /// 1 if the nodes of every corner are consecutive over the lanes.
     pub contiguous: u32,
 }
 
@@ -88,11 +88,11 @@ pub struct Header {
 pub struct Params {
     /// Nodes in a plane of the position buffers.
     pub nodes: u32,
-    /// Factor on the axial stiffness of fibres across their lines, see [`crate::dynamics::time_step::left`]; 0 without lines.
+    /// Factor on the axial fibre stiffness across the fibre lines, see [`crate::dynamics::time_step::left`]; 0 without lines.
     pub left: f32,
 }
 
-/// What all kernels of hexahedra read; displacements are quanta and remainder.
+/// Inputs of all hexahedron kernels; displacements are quanta and remainder.
 const READS: [Slot; 7] = [
     Slot::read("headers", Uint),
     Slot::read("corners", Uint),
@@ -103,22 +103,22 @@ const READS: [Slot; 7] = [
     Slot::read("materials", Scalar),
 ];
 
-/// The slots of forces; the stress sum is for periodic scenes.
+/// The slots of forces; the virial stress sum exists only in periodic scenes.
 pub const fn force_slots(periodic: bool) -> [Slot; 9] {
     joined(&READS, &[Slot::row("out", Scalar, SLOTS), Slot::row("out_virial", Scalar, VIRIAL).when(periodic)])
 }
 
-/// The slots of energies; those of hourglass modes are for reduced integration.
+/// The slots of energies; hourglass energies exist only with reduced integration.
 pub const fn energy_slots(reduced: bool) -> [Slot; 9] {
     joined(&READS, &[Slot::row("out", Scalar, ENERGY), Slot::row("out_hourglass", Scalar, LANES).when(reduced)])
 }
 
-/// The slots of bounds; those that are weighed read R/m of nodes in the second plane of the weights.
+/// The slots of bounds; weighed bounds read R/m of nodes in the second plane of the weights.
 pub const fn bound_slots(weighed: bool) -> [Slot; 9] {
     joined(&READS, &[Slot::read("weights", Scalar).when(weighed), Slot::row("out", Scalar, BOUND)])
 }
 
-/// A block and one register of its lanes.
+/// A block, and one register of its lanes.
 pub struct Lanes<'a, L: Lane> {
     header: Header,
     corners: &'a [u32],
@@ -128,7 +128,7 @@ pub struct Lanes<'a, L: Lane> {
 }
 
 impl<'a, L: Lane> Lanes<'a, L> {
-    /// The lanes of a block from `lane` on; a shape has `size` numbers.
+    /// The lanes of a block from `lane` on; `size` is the length of a shape.
     #[inline(always)]
     pub fn new(io: &'a Io<L::Scalar>, size: usize, block: usize, lane: usize) -> Self {
         let header: Header =
@@ -148,7 +148,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
         L::load(&self.shape[entry * LANES + self.lane..])
     }
 
-    /// The axes of the fibre's frame, one a column.
+    /// The axes of the fibre's frame, one per column.
     #[inline(always)]
     pub fn frame(&self, io: &Io<L::Scalar>) -> Tensor<L> {
         splat_tensor(&self.scalar_frame(io))
@@ -160,7 +160,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
         [[q[0], q[1], q[2]], [q[3], q[4], q[5]], [q[6], q[7], q[8]]]
     }
 
-    /// The macroscopic gradient F̄ − I in the fibre's frame, of a periodic scene.
+    /// The macroscopic displacement gradient F̄ − I in the fibre's frame, in a periodic scene.
     #[inline(always)]
     pub fn macroscopic<const PERIODIC: bool>(&self, io: &Io<L::Scalar>) -> Option<Tensor<L>> {
         PERIODIC.then(|| splat_tensor(&turn(&self.scalar_frame(io), &io.row.gradient, false)))
@@ -214,7 +214,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
         global
     }
 
-    /// What the rows of stiffness are weighed with at the binary corners: one, or with `WEIGHED` R/m of the nodes.
+    /// Weights of the stiffness rows at the binary corners: one, or with `WEIGHED` R/m of the nodes.
     #[inline(always)]
     pub fn weights<const WEIGHED: bool>(&self, io: &Io<L::Scalar>, nodes: usize) -> [L; 8] {
         let mut weights = [L::new(1.0); 8];
@@ -232,13 +232,13 @@ impl<'a, L: Lane> Lanes<'a, L> {
         weights
     }
 
-    /// Writes a component of the force on a corner (in mesh order).
+    /// Writes a force component of a corner (in mesh order).
     #[inline(always)]
     pub fn store_force(&self, slots: &mut [L::Scalar], corner: usize, component: usize, force: L) {
         force.store(&mut slots[(3 * corner + component) * LANES + self.lane..]);
     }
 
-    /// Writes the rows of stiffness of the binary corners of a block.
+    /// Writes the stiffness row sums of the binary corners of a block.
     #[inline(always)]
     pub fn store_rows<const WEIGHED: bool>(&self, io: &Io<L::Scalar>, block: usize, rows: &[L; 8]) {
         let mut bounds = io.own::<L::Scalar>(slot!(&bound_slots(WEIGHED), "out"));
@@ -248,7 +248,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
         }
     }
 
-    /// Adds V P, in the fibre's frame, to the stress sum of a block.
+    /// Adds V P, in the fibre's frame, to the virial stress sum of a block.
     #[inline(always)]
     pub fn add_virial(&self, io: &Io<L::Scalar>, block: usize, q: &Tensor<L>, stress: &Tensor<L>) {
         let sum = turn(q, stress, true);
@@ -307,7 +307,7 @@ pub fn cross<L: Lane>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Sum of eight numbers by their weights, in order.
+/// Weighted sum of eight numbers, in order.
 #[inline(always)]
 pub fn total<L: Lane>(numbers: &[L; 8], weights: &[L; 8]) -> L {
     let mut sum = numbers[0] * weights[0];

@@ -1,8 +1,8 @@
 //! Fully integrated 8-node hexahedron, total Lagrangian, 2 × 2 × 2 Gauss points.
 //!
-//! The derivatives of the trilinear shape functions are products of one-dimensional factors: they are taken direction by
-//! direction (sum factorisation), which costs a third of the textbook sum over corners. Displacements are turned into the
-//! fibre's frame first; in periodic scenes the macroscopic gradient F̄ − I is added to H.
+//! The derivatives of the trilinear shape functions are products of one-dimensional factors. They are evaluated direction by
+//! direction (sum factorisation), at a third of the cost of the textbook sum over corners. Displacements are rotated into the
+//! fibre's frame first; in periodic scenes the macroscopic displacement gradient F̄ − I is added to H.
 
 use super::LANES;
 use super::block::{
@@ -16,13 +16,13 @@ use crate::materials::{Material, PARAMETERS, Tensor, jacobian};
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Numbers of a shape: at each Gauss point, 9 of the inverse Jacobian (halved) and the volume; times lanes.
+/// Numbers per shape: at each Gauss point, 9 of the inverse Jacobian (halved) and the volume; times lanes.
 pub const SHAPE: usize = 8 * POINT * LANES;
-/// Numbers of a Gauss point in a shape, and which of them is the volume.
+/// Numbers per Gauss point in a shape, and the index of the volume.
 pub const POINT: usize = 10;
 const VOLUME: usize = 9;
 
-/// One-dimensional shape function at its own and at the opposite Gauss point.
+/// One-dimensional shape function at the near and at the far Gauss point.
 const NEAR: f64 = 0.788_675_134_594_812_9;
 const FAR: f64 = 0.211_324_865_405_187_13;
 
@@ -36,11 +36,11 @@ impl Element for Hex8 {
     const CONSTANTS: &'static [Constant] = &constants![uint: SHAPE; scalar: NEAR, FAR];
 }
 
-/// Nodal forces of hexahedra; with `PERIODIC`, also the sum of stress for the homogenised first Piola stress.
+/// Nodal forces of hexahedra; with `PERIODIC`, also the virial stress sum for the homogenised first Piola–Kirchhoff stress.
 pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
-/// Energies by mode and smallest Jacobian.
+/// Energies by mode, and the smallest Jacobian.
 pub struct Energy<M, const PERIODIC: bool>(PhantomData<M>);
-/// Row sums of the stiffness that fibre lines do not cover, with `WEIGHED` by R/m of the nodes: see
+/// Row sums of the stiffness matrix that fibre lines do not cover, with `WEIGHED` weighted by R/m of the nodes: see
 /// [`crate::dynamics::time_step`].
 pub struct Bound<M, const PERIODIC: bool, const WEIGHED: bool>(PhantomData<M>);
 
@@ -79,14 +79,14 @@ fn gradient<L: Lane>(lanes: &Lanes<L>, point: usize, d: &Derivatives<L>) -> Tens
     h
 }
 
-/// For each direction, which of the four points of the other two directions a Gauss point is.
+/// Index of a Gauss point among the four points of the other two directions, for each direction.
 #[inline(always)]
 fn others(point: usize) -> [usize; 3] {
     let (i, j, k) = (point & 1, point >> 1 & 1, point >> 2);
     [j + 2 * k, i + 2 * k, i + 2 * j]
 }
 
-/// For each direction, the binary corner at its low end for the four corners of the other two directions, and the step to the high end.
+/// For each direction: the low binary corner of each of its four edges, and the step to the high end.
 const EDGES: [([usize; 4], usize); 3] = [([0, 2, 4, 6], 1), ([0, 1, 4, 5], 2), ([0, 1, 2, 3], 4)];
 
 /// Differences of corner values along each direction (twice the derivative), interpolated to the Gauss points of the others.
@@ -142,12 +142,12 @@ fn corner_forces<L: Lane>(g: &[[L; 4]; 3]) -> [L; 8] {
     f
 }
 
-/// Something to do at each Gauss point of one register of hexahedra.
+/// An operation at each Gauss point of one register of hexahedra.
 trait Visitor<L: Lane> {
     fn point(&mut self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, volume: L);
 }
 
-/// Visits the Gauss points of one register of hexahedra with H, and with the volume of the point.
+/// Visits the Gauss points of one register of hexahedra, with H and the volume of the point.
 #[inline(always)]
 fn visit<L: Lane, const PERIODIC: bool>(
     io: &Io<L::Scalar>,
@@ -171,7 +171,7 @@ fn visit<L: Lane, const PERIODIC: bool>(
     }
 }
 
-/// Sums stress into forces conjugate to derivatives, and for periodic scenes into V P̄.
+/// Sums stress into forces conjugate to the derivatives, and for periodic scenes into V P̄.
 struct Stress<L: Lane, M, const PERIODIC: bool> {
     material: [L; PARAMETERS],
     forces: Derivatives<L>,
@@ -220,13 +220,13 @@ impl<L: Lane, M: Material> Visitor<L> for Energies<L, M> {
     }
 }
 
-/// Sums the bound of each corner's stiffness, modulus × |∂N_a| × Σ|∂N|: across the fibre, in longitudinal shear, of tension,
-/// and of the fibre as far as lines do not cover it.
+/// Sums the stiffness bound of each corner, modulus × |∂N_a| × Σ|∂N|, from the section, longitudinal shear, tension, and the
+/// part of the fibre stiffness that fibre lines do not cover.
 struct Bounds<L: Lane, M> {
     material: [L; PARAMETERS],
     rows: [L; 8],
     weights: [L; 8],
-    /// Displacement of the high against the low corner of the four edges along ξ, by component.
+    /// Displacement of the high corner relative to the low corner of the four edges along ξ, by component.
     edges: [[L; 4]; 3],
     macroscopic: Option<Tensor<L>>,
     /// See [`super::block::Params::left`].
@@ -235,8 +235,8 @@ struct Bounds<L: Lane, M> {
 }
 
 impl<L: Lane, M: Material> Bounds<L, M> {
-    /// Sizes of the derivatives along the fibre that lines do not cover. A line acts along its own edge, and a fibre at the
-    /// Gauss point may have another direction, where the four edges have turned away from each other.
+    /// Magnitudes of the derivatives along the fibre that lines do not cover. A line acts along its own edge, and the fibre at
+    /// the Gauss point may have another direction if the four edges have turned away from each other.
     #[inline(always)]
     fn uncovered(&self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, along: &[L; 8]) -> [L; 8] {
         let mut sizes = along.map(|slope| slope.abs());

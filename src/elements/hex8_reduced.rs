@@ -1,6 +1,6 @@
-//! 8-node hexahedron with one integration point and hourglass control, total Lagrangian.
+//! 8-node hexahedron with one Gauss point and hourglass control, total Lagrangian.
 //!
-//! The displacement gradient is the mean over the element (Flanagan and Belytschko 1981), taken in the reference:
+//! The displacement gradient is the element mean (Flanagan and Belytschko 1981), in the reference configuration:
 //!
 //! ```text
 //! H = Σ_a u_a ⊗ B_a,   B_a = (1/V) ∫ ∇N_a dV       so that Σ_a X_a ⊗ B_a = I on any shape
@@ -9,9 +9,10 @@
 //! ```
 //!
 //! A uniform stress gives the forces of the fully integrated element: the patch test holds on any shape. H does not see the
-//! twelve modes u = q h_α; only their stiffness k_α, of the shear modulus of the law, resists them. No γ_α sees a linear
-//! displacement, so that k_α changes no uniform deformation, a macroscopic gradient adds to H alone, and a rotation turns q
-//! and leaves W. The modes bend fibres within an element: there the fibres' own stiffness has no part.
+//! twelve hourglass modes u = q h_α; only their stiffness k_α, based on the shear modulus of the material law, resists them. No
+//! γ_α sees a linear displacement. Hence k_α changes no uniform deformation, a macroscopic displacement gradient is added to H
+//! only, and a rotation rotates q and leaves W unchanged. The hourglass modes bend fibres within an element, where the fibre
+//! stiffness does not contribute.
 
 use super::LANES;
 use super::block::{
@@ -25,15 +26,15 @@ use crate::materials::{Material, Tensor, jacobian};
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Numbers of a shape: of the B of both ends of each edge along ξ half the difference and half the sum (3 each), the volume,
-/// Σ h_α X of each mode (3), k_α of each mode; times lanes.
+/// Numbers per shape: half the difference and half the sum of the B at both ends of each edge along ξ (3 each), the volume, Σ
+/// h_α X of each mode (3), k_α of each mode; times lanes.
 pub const SHAPE: usize = (STIFFNESS + 4) * LANES;
-/// Where they start.
+/// Their start indices.
 const VOLUME: usize = 24;
 const MOMENTS: usize = 25;
 const STIFFNESS: usize = 37;
 
-/// The modes ηζ, ξζ, ξη and ξηζ at the binary corners.
+/// The hourglass modes ηζ, ξζ, ξη and ξηζ at the binary corners.
 pub const MODES: [[f64; 8]; 4] = [
     [1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0],
     [1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0],
@@ -41,7 +42,7 @@ pub const MODES: [[f64; 8]; 4] = [
     [-1.0, 1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0],
 ];
 
-/// Energies of the modes of a block, mJ.
+/// Hourglass energies per block, mJ.
 pub const HOURGLASS: usize = LANES;
 
 /// The element.
@@ -51,16 +52,16 @@ impl Element for Hex8Reduced {
     const CONSTANTS: &'static [Constant] = &constants![uint: SHAPE, VOLUME, MOMENTS, STIFFNESS, HOURGLASS];
 }
 
-/// Nodal forces of hexahedra; with `PERIODIC`, also the sum of stress for the homogenised first Piola stress.
+/// Nodal forces of hexahedra; with `PERIODIC`, also the virial stress sum for the homogenised first Piola–Kirchhoff stress.
 pub struct Force<M, const PERIODIC: bool>(PhantomData<M>);
-/// Energies by mode and Jacobian; energy of the hourglass modes.
+/// Energies by mode, and the smallest Jacobian; hourglass energy.
 pub struct Energy<M, const PERIODIC: bool>(PhantomData<M>);
-/// Row sums of the stiffness that fibre lines do not cover, with `WEIGHED` by R/m of the nodes: see
+/// Row sums of the stiffness matrix that fibre lines do not cover, with `WEIGHED` weighted by R/m of the nodes: see
 /// [`crate::dynamics::time_step`].
 pub struct Bound<M, const PERIODIC: bool, const WEIGHED: bool>(PhantomData<M>);
 
-/// Half the difference and half the sum of B at both ends of an edge along ξ: strain of fibres comes from differences of near
-/// nodes, which f32 does not round.
+/// Half the difference and half the sum of B at both ends of an edge along ξ: fibre strain is computed from differences of near
+/// nodes, which are exact in f32.
 #[inline(always)]
 fn slopes<L: Lane>(lanes: &Lanes<L>, edge: usize) -> [[L; 3]; 2] {
     let first = 6 * edge;
@@ -179,7 +180,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Force<M, PERIODIC> {
                 let q = lanes.frame(io);
                 let out = slots.item(0, item);
                 for i in 0..3 {
-                    // what is conjugate to the gradient: stress, less what the modes take from linear displacements
+                    // conjugate to the gradient: stress, minus the response of the hourglass modes to linear displacements
                     let mut conjugate = [L::new(0.0); 3];
                     for j in 0..3 {
                         for k in 0..3 {
@@ -241,7 +242,7 @@ impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
     }
 }
 
-/// Adds the rows of a stiffness that is bounded by k times the products of the sizes of its corners.
+/// Adds the row sums of a stiffness matrix bounded by k times the products of its corner magnitudes.
 #[inline(always)]
 fn add_rows<L: Lane>(rows: &mut [L; 8], k_total: L, sizes: &[L; 8]) {
     for (row, size) in rows.iter_mut().zip(sizes) {
@@ -284,8 +285,8 @@ impl<M: Material, const PERIODIC: bool, const WEIGHED: bool> Kernel for Bound<M,
                 if left == 0.0 {
                     add_rows(&mut rows, m.along * volume * sums[0], &slopes[0]);
                 } else {
-                    // fibres are stiff along their mean, fibre lines heavy along each edge: what is between these directions is
-                    // not covered, (d + e)² ≤ 2 d² + 2 e²
+                    // fibre stiffness acts along the mean fibre, fibre lines along each edge: the difference between these
+                    // directions is not covered, (d + e)² ≤ 2 d² + 2 e²
                     let mut sizes = [zero; 8];
                     for (corner, size) in sizes.iter_mut().enumerate() {
                         let along = slope(&lanes, corner)[0].abs();
@@ -293,7 +294,7 @@ impl<M: Material, const PERIODIC: bool, const WEIGHED: bool> Kernel for Bound<M,
                         for i in 0..3 {
                             let mut apart = zero;
                             for mode in 1..4 {
-                                // of the derivative along ξ: the sign of ξ itself does not matter
+                                // derivative along ξ: the sign of ξ itself does not matter
                                 apart = apart + L::new(MODES[mode][corner]) * modes[mode][i];
                             }
                             square = apart.fma(apart, square);

@@ -1,4 +1,4 @@
-//! Elements: they read the state of their nodes and write only their own corner slots.
+//! Elements: they read the state of their nodes and write only to their own corner slots.
 
 pub mod beam2;
 pub mod bend;
@@ -8,7 +8,7 @@ pub mod hex8_reduced;
 
 use crate::kernel::interface::{Constant, constants};
 
-/// Hexahedra in a block, and fibre lines in a group.
+/// Hexahedra per block, and fibre lines per group.
 pub const LANES: usize = 16;
-/// What twins know of them.
+/// Constants shared with the twins.
 pub const CONSTANTS: [Constant; 1] = constants![uint: LANES];

@@ -3,7 +3,7 @@
 use super::lane::Real;
 use bytemuck::{Pod, Zeroable};
 
-/// What a buffer holds.
+/// Number type of a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Scalars of the run's precision.
@@ -14,31 +14,31 @@ pub enum Kind {
     Uint,
 }
 
-/// Name of a buffer in a plan: its number.
+/// Handle of a buffer in a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Buffer(pub(crate) usize);
 
 impl Buffer {
-    /// Number of its description in the plan.
+    /// Index of its description in the plan.
     pub fn number(self) -> usize {
         self.0
     }
 }
 
-/// A buffer as the plan describes it.
+/// Description of a buffer in a plan.
 #[derive(Debug, Clone)]
 pub struct Description {
     pub name: &'static str,
     pub kind: Kind,
-    /// Numbers, not bytes.
+    /// Length in numbers, not bytes.
     pub len: usize,
     /// Part of the state: hashed and written to checkpoints.
     pub persistent: bool,
-    /// What the buffer holds at the start; the rest is zero.
+    /// Initial contents; the rest is zero.
     pub initial: Initial,
 }
 
-/// Contents at the start.
+/// Initial contents.
 #[derive(Debug, Clone)]
 pub enum Initial {
     Zero,
@@ -108,7 +108,7 @@ impl Array {
         self.lines.fill(CacheLine::zeroed());
     }
 
-    /// Address of the first number; the numbers stay where they are as long as the array lives.
+    /// Address of the first number; it is stable for the lifetime of the array.
     pub fn address(&mut self) -> *mut u8 {
         self.lines.as_mut_ptr().cast()
     }
@@ -121,7 +121,7 @@ impl Array {
         self.len == 0
     }
 
-    /// Bytes of a number.
+    /// Bytes per number.
     pub fn size(&self) -> usize {
         self.size
     }

@@ -1,5 +1,5 @@
-//! The arithmetic that a device must get right to the last bit: whole quanta with remainders that take many small steps, and
-//! sums of integers in any order. Compilers that re-associate floating-point sums would lose the steps.
+//! Arithmetic that a device must get right to the last bit: whole quanta with remainders over many small steps, and
+//! order-independent integer sums. Compilers that re-associate floating-point sums would lose the steps.
 
 use super::buffer::Kind::{Int, Scalar};
 use super::interface::{Slot, constants, slot};
@@ -10,13 +10,13 @@ use super::stage::{Io, Kernel};
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
-/// Steps that every item takes.
+/// Steps per item.
 pub const STEPS: usize = 2048;
 
-/// The march of every item.
+/// Marches every item by many small steps.
 pub struct Exact;
 
-/// Where item `i` starts, quanta, and what it adds in each step, mm: from a thousandth of a quantum to a hundred.
+/// Start of item `i`, quanta, and its increment per step, mm: from a thousandth of a quantum to a hundred quanta.
 pub fn start(item: usize) -> (i32, f64) {
     let sign = if item.is_multiple_of(2) { 1.0 } else { -1.0 };
     (quanta(item as f64 * 0.37 - 150.0), sign * QUANTUM * libm::pow(10.0, (item % 97) as f64 * 5.0 / 96.0 - 3.0))
@@ -29,7 +29,7 @@ impl Kernel for Exact {
         Slot::read("increments", Scalar),
         Slot::row("quanta", Int, 1),
         Slot::row("remainders", Scalar, 1),
-        // of all quanta, wrapping
+        // sum of all quanta, wrapping
         Slot::atomic("sum", Int),
     ];
 

@@ -1,34 +1,34 @@
-//! The interface of a kernel: the buffers that it binds and the constants that it shares with its WGSL twin, each declared once.
+//! The interface of a kernel: its buffer bindings and the constants shared with its WGSL twin, each declared once.
 //!
-//! A kernel lists [`Slot`]s. Its Rust function finds the number of a slot by name when it is compiled (`slot!`), the text of the
-//! twin gets its bindings from the same list, and the plan binds buffers by the same names. A slot that belongs to an effect is
-//! there only [`Slot::when`] the kernel has the flag of that effect; all numbers behind it follow.
+//! A kernel lists [`Slot`]s. Its Rust function finds the number of a slot by name at compile time (`slot!`), the twin gets its
+//! bindings from the same list, and the plan binds buffers by the same names. The slot of an effect exists only [`Slot::when`]
+//! the kernel has the flag of that effect; later slots are numbered accordingly.
 
 use super::buffer::Kind;
 
-/// How the items of a stage write to a buffer. Reads of the same buffer by the same item are allowed.
+/// Write access of the items of a stage to a buffer. The same item may also read the buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {
     /// Item `i` owns `stride` numbers from `i · stride` in each of `planes` equal parts of the buffer.
     Own { planes: usize, stride: usize },
-    /// Items own disjoint numbers that a table or the constants of the stage name.
+    /// Items own disjoint numbers, given by a table or by the constants of the stage.
     Scatter,
-    /// Integers that any item may add to; the order does not matter.
+    /// Integers to which any item may add; the order does not matter.
     Atomic,
 }
 
-/// The stride of rows whose length only the plan knows.
+/// Stride of rows whose length is known only to the plan.
 const OF_THE_PLAN: usize = 0;
 
-/// A buffer that a kernel binds. Slots that are read come before those that are written.
+/// A buffer binding of a kernel. Slots that are read precede slots that are written.
 #[derive(Debug, Clone, Copy)]
 pub struct Slot {
     /// Name of the variable in the twin, and of the buffer at binding.
     pub name: &'static str,
     pub kind: Kind,
-    /// `None` if it is only read.
+    /// Write access; `None` for a read-only buffer.
     pub access: Option<Access>,
-    /// Whether the kernel has it with its flags.
+    /// Whether the kernel has the slot under its flags.
     pub there: bool,
 }
 
@@ -37,46 +37,46 @@ impl Slot {
         Self { name, kind, access, there: true }
     }
 
-    /// A buffer that is read.
+    /// A read-only buffer.
     pub const fn read(name: &'static str, kind: Kind) -> Self {
         Self::new(name, kind, None)
     }
 
-    /// A buffer of so many planes, in each of which an item owns one number.
+    /// A buffer of `planes` planes, in each of which an item owns one number.
     pub const fn planes(name: &'static str, kind: Kind, planes: usize) -> Self {
         Self::new(name, kind, Some(Access::Own { planes, stride: 1 }))
     }
 
-    /// A buffer in which an item owns so many numbers in a row.
+    /// A buffer in which an item owns `stride` consecutive numbers.
     pub const fn row(name: &'static str, kind: Kind, stride: usize) -> Self {
         assert!(stride != OF_THE_PLAN);
         Self::new(name, kind, Some(Access::Own { planes: 1, stride }))
     }
 
-    /// A buffer in which an item owns as many numbers in a row as the plan says when it binds the buffer.
+    /// A buffer in which an item owns consecutive numbers; the plan gives their count when it binds the buffer.
     pub const fn row_of_plan(name: &'static str, kind: Kind) -> Self {
         Self::new(name, kind, Some(Access::Own { planes: 1, stride: OF_THE_PLAN }))
     }
 
-    /// A buffer in which items own disjoint numbers that a table names.
+    /// A buffer in which items own disjoint numbers given by a table.
     pub const fn scatter(name: &'static str, kind: Kind) -> Self {
         Self::new(name, kind, Some(Access::Scatter))
     }
 
-    /// Integers that any item may add to.
+    /// Integers to which any item may add.
     pub const fn atomic(name: &'static str, kind: Kind) -> Self {
         Self::new(name, kind, Some(Access::Atomic))
     }
 
-    /// The slot, only with a flag.
+    /// Makes the slot conditional on a flag.
     pub const fn when(self, flag: bool) -> Self {
         Self { there: self.there && flag, ..self }
     }
 
-    /// The access with a stride that the plan gives, if any.
+    /// The access with the stride given by the plan, if any.
     ///
     /// # Errors
-    /// What does not fit: a stride that is missing, or one that the slot has already.
+    /// The mismatch: a missing stride, or a stride for a slot that already has one.
     pub(super) fn access_with(&self, given: Option<usize>) -> Result<Option<Access>, &'static str> {
         match (self.access, given) {
             (Some(Access::Own { planes, stride: OF_THE_PLAN }), Some(stride)) => {
@@ -102,21 +102,21 @@ impl Slot {
     }
 }
 
-/// Number of a slot among those that are there; the kernel does not compile if it is not there.
+/// Number of a slot among the active ones; compilation fails if the slot is not active.
 pub const fn place(slots: &[Slot], name: &str) -> usize {
     let (found, there) = find(slots, name);
     assert!(there, "the kernel does not have this slot with its flags");
     found
 }
 
-/// Number of a slot that is there with a `flag`; without the flag, a number that no buffer has.
+/// Number of a slot that is active with a `flag`; without the flag, a number that no buffer has.
 pub const fn place_when(slots: &[Slot], name: &str, flag: bool) -> usize {
     let (found, there) = find(slots, name);
     assert!(there || !flag, "the kernel does not have this slot with its flags");
     if there { found } else { usize::MAX }
 }
 
-/// How many slots are there before the one of a name, and whether it is there itself.
+/// Number of active slots before a named slot, and whether that slot is active.
 const fn find(slots: &[Slot], name: &str) -> (usize, bool) {
     let (mut i, mut number) = (0, 0);
     while i < slots.len() {
@@ -144,7 +144,7 @@ const fn same(a: &str, b: &str) -> bool {
     true
 }
 
-/// Slots that several kernels share, and then those of one of them.
+/// Shared slots of several kernels, followed by the slots of one kernel.
 pub const fn joined<const N: usize>(shared: &[Slot], own: &[Slot]) -> [Slot; N] {
     assert!(shared.len() + own.len() == N);
     let mut all = [Slot::read("", Kind::Scalar); N];
@@ -156,8 +156,8 @@ pub const fn joined<const N: usize>(shared: &[Slot], own: &[Slot]) -> [Slot; N] 
     all
 }
 
-/// Number of a slot, found when the kernel is compiled: `slot!(Self::SLOTS, "mass")`, or `slot!(Self::SLOTS, "mass", FLAG)` for a
-/// slot that is there with a flag.
+/// Number of a slot, found at compile time: `slot!(Self::SLOTS, "mass")`, or `slot!(Self::SLOTS, "mass", FLAG)` for a slot that
+/// depends on a flag.
 macro_rules! slot {
     ($slots:expr, $name:literal) => {
         const { crate::kernel::interface::place($slots, $name) }
@@ -168,7 +168,7 @@ macro_rules! slot {
 }
 pub(crate) use slot;
 
-/// A constant that a twin takes from Rust.
+/// A Rust constant used by a twin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Constant {
     pub name: &'static str,
@@ -198,7 +198,7 @@ impl Constant {
         Self { name, value: Value::Scalar((value as f32).to_bits()) }
     }
 
-    /// The declaration in the twin. All digits of an f32 are written, so that it is read as the same number.
+    /// The declaration in the twin. All digits of an f32 are written, so that it reads back as the same number.
     pub(super) fn declaration(&self) -> String {
         let name = self.name;
         match self.value {
@@ -209,7 +209,8 @@ impl Constant {
     }
 }
 
-/// Constants under their Rust names: `constants![uint: LEAST, CLOSED; scalar: TIE]`; with another name or value as in `KIND = 1`.
+/// Constants under their Rust names: `constants![uint: LEAST, CLOSED; scalar: TIE]`; another name or value is given as in `KIND
+/// = 1`.
 macro_rules! constants {
     ($($type:ident: $($name:ident $(= $value:expr)?),+);+ $(;)?) => {
         [$($(crate::kernel::interface::constants!(@ $type $name $($value)?)),+),+]

@@ -1,4 +1,4 @@
-//! Scalars and SIMD registers behind one trait, so that a kernel is written once.
+//! Scalars and SIMD registers under one trait, so that a kernel is written once.
 //!
 //! Every operation is IEEE: add, subtract, multiply, divide, square root and *fused* multiply–add are correctly rounded
 //! on every instruction set, comparisons select like `if`, and nothing is re-associated. A kernel therefore gives the
@@ -24,7 +24,7 @@ pub trait Lane:
     type Scalar: Real;
     /// Result of a comparison, lane by lane.
     type Mask: Copy;
-    /// Numbers in a register.
+    /// Lanes per register.
     const WIDTH: usize;
 
     /// The same number in every lane.
@@ -52,12 +52,12 @@ pub trait Lane:
     fn new(x: f64) -> Self {
         Self::splat(Self::Scalar::from_f64(x))
     }
-    /// The smaller; `other` if either is not a number.
+    /// The minimum; `other` if either is NaN.
     #[inline(always)]
     fn min(self, other: Self) -> Self {
         Self::select(self.lt(other), self, other)
     }
-    /// The larger; `other` if either is not a number.
+    /// The maximum; `other` if either is NaN.
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         Self::select(other.lt(self), self, other)
@@ -68,7 +68,7 @@ pub trait Lane:
 pub trait Real: Lane<Scalar = Self> + Pod + Send + Sync + PartialOrd + Default {
     /// Whether positions are whole quanta plus a remainder (see [`super::position`]).
     const QUANTISED: bool;
-    /// Terms that the series in [`super::math`] need.
+    /// Number of terms of the series in [`super::math`].
     const LN_TERMS: usize;
     const EXP_TERMS: usize;
     const ASINH_TERMS: usize;
@@ -79,13 +79,13 @@ pub trait Real: Lane<Scalar = Self> + Pod + Send + Sync + PartialOrd + Default {
     /// Nearest whole number, saturating.
     fn to_i32(self) -> i32;
     fn is_finite(self) -> bool;
-    /// Runs `work` on registers of the instruction set.
+    /// Runs `work` on the registers of an instruction set.
     fn dispatch<W: Work<Self>>(isa: Isa, work: W);
 }
 
-/// Something to run on registers that are known only at run time.
+/// Work for registers that are known only at run time.
 pub trait Work<R: Real> {
-    /// Whether it gains from the widest registers there are.
+    /// Whether it benefits from the widest available registers.
     const WIDE: bool;
     fn run<L: Lane<Scalar = R>>(self);
 }
@@ -110,7 +110,7 @@ pub enum Isa {
 use pulp::x86::{V3, V4};
 
 impl Isa {
-    /// All that this processor has, best last.
+    /// All instruction sets of this processor, best last.
     pub fn available() -> Vec<Isa> {
         let mut all = vec![Isa::Scalar];
         #[cfg(target_arch = "x86_64")]
@@ -123,7 +123,7 @@ impl Isa {
         all
     }
 
-    /// The best that this processor has.
+    /// The best instruction set of this processor.
     pub fn best() -> Isa {
         *Self::available().last().expect("scalar is always available")
     }
@@ -136,7 +136,7 @@ pub struct F32<S: Simd>(S::f32s);
 #[derive(Clone, Copy, Debug)]
 pub struct F64<S: Simd>(S::f64s);
 
-/// The token of an instruction set whose registers are in use.
+/// The token of the instruction set in use.
 #[inline(always)]
 fn token<S: Simd>() -> S {
     const { assert!(size_of::<S>() == 0) }
@@ -431,7 +431,7 @@ macro_rules! scalar {
     };
 }
 
-/// Carries work into the functions that are compiled for an instruction set.
+/// Carries work into functions compiled for one instruction set.
 struct On<W, R>(W, std::marker::PhantomData<R>);
 
 scalar!(f32, u32, 23, 127u32, SQRT_HALF_F32, MAGIC_F32, F32, true, 5, 8, 4);

@@ -1,5 +1,5 @@
-//! Elementary functions as polynomials: the same statements, hence the same bits, on every processor, and a WGSL twin,
-//! since WGSL has neither log1p nor promises on ln and exp.
+//! Elementary functions as polynomials: the same statements, hence the same bits, on every processor, and a WGSL twin, since
+//! WGSL has no log1p and guarantees little about ln and exp.
 
 use super::interface::{Constant, constants};
 use super::lane::{Lane, Real, SQRT_HALF_F32};
@@ -7,7 +7,7 @@ use std::f64::consts::LOG2_E;
 
 const LN2_HIGH: f64 = 0.693_145_751_953_125; // 15 bits: exact products with exponents
 const LN2_LOW: f64 = 1.428_606_820_309_417_2e-6;
-/// What the twin shares, with the bits of √½ and of 1 in f32.
+/// Constants shared with the twin, including the bits of √½ and of 1 in f32.
 pub const CONSTANTS: [Constant; 5] =
     constants![scalar: LN2_HIGH, LN2_LOW, LOG2_E; uint: SQRT_HALF = SQRT_HALF_F32, BIAS = 1f32.to_bits()];
 
@@ -18,8 +18,8 @@ pub fn ln<L: Lane>(x: L) -> L {
     logarithm(m - L::new(1.0), e)
 }
 
-/// ln(1 + x) for x > −1, accurate for small x: as long as 1 + x has the exponent of 1, its mantissa less 1 is x itself,
-/// without the rounding of the sum.
+/// ln(1 + x) for x > −1, accurate for small x: as long as 1 + x has the exponent of 1, its mantissa minus 1 is x itself,
+/// without the rounding error of the sum.
 #[inline(always)]
 pub fn log1p<L: Lane>(x: L) -> L {
     let (m, e) = (L::new(1.0) + x).mantissa_exponent();
@@ -62,7 +62,7 @@ const fn factorial(n: usize) -> f64 {
     f
 }
 
-/// asinh(√u)/√u for u ≥ 0, without the singular derivative of either factor at zero.
+/// asinh(√u)/√u for u ≥ 0, without the singular derivatives of its factors at zero.
 #[inline(always)]
 pub fn asinh_ratio<L: Lane>(u: L) -> L {
     // series Σ (−1)ⁿ (2n)!/(4ⁿ n!² (2n + 1)) uⁿ
@@ -84,7 +84,7 @@ pub fn asinh_ratio<L: Lane>(u: L) -> L {
     L::select(u.lt(L::new(0.01)), series, far)
 }
 
-/// Smooth step from 0 to 1 with flat ends: t²(3 − 2t), constant outside.
+/// Smooth step from 0 to 1 with zero slope at both ends: t²(3 − 2t), constant outside.
 pub fn smooth(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)

@@ -1,5 +1,4 @@
-//! What both backends share: scalars and lanes, elementary functions, positions, buffers, stages and plans, records of host
-//! state.
+//! Common to both backends: scalars and lanes, elementary functions, positions, buffers, stages and plans, records of host state.
 //! A kernel is written once over [`lane::Lane`] and runs as f32 or f64, one item or a whole register at a time.
 
 pub mod buffer;

@@ -1,11 +1,11 @@
-//! Access to the state of nodes: three planes (x, y, z) a buffer.
+//! Access to nodal state: three planes (x, y, z) per buffer.
 
 use super::lane::Real;
 use super::position::{QUANTUM, difference};
 use super::stage::Io;
 use super::vector::Vector;
 
-/// Three planes of a buffer. They have one length, so that a node is compared with it once for all three.
+/// Three planes of a buffer. They have the same length, so one bounds check of a node index serves all three.
 #[derive(Clone, Copy)]
 struct Planes<'a, T> {
     values: [&'a [T]; 3],
@@ -41,7 +41,7 @@ impl<'a, R: Real> Displacements<'a, R> {
         Self { quanta: Planes::new(io.ints(quanta)), remainder: Planes::new(io.scalars(remainder)) }
     }
 
-    /// Displacement of `a` less that of `b`, mm.
+    /// Displacement of `a` minus displacement of `b`, mm.
     #[inline(always)]
     pub fn between(&self, a: usize, b: usize) -> Vector<R> {
         let (qa, ra, qb, rb) = (self.quanta.at(a), self.remainder.at(a), self.quanta.at(b), self.remainder.at(b));
@@ -82,7 +82,7 @@ impl<'a> Lattice<'a> {
         Self { quanta: Planes::new(io.ints(index)) }
     }
 
-    /// Reference position of `a` less that of `b`, plus whole quanta `shift` along x and y, mm.
+    /// Reference position of `a` minus that of `b`, plus whole quanta `shift` along x and y, mm.
     #[inline(always)]
     pub fn between<R: Real>(&self, a: usize, b: usize, shift: [i32; 2]) -> Vector<R> {
         let (a, b, shift) = (self.quanta.at(a), self.quanta.at(b), [shift[0], shift[1], 0]);

@@ -1,20 +1,20 @@
 //! Positions as whole quanta plus a remainder.
 //!
-//! An f32 displacement of 60 mm resolves 4e-6 mm, and explicit steps of 1e-8 mm would never move it. Reference positions
-//! are whole multiples of a quantum of 2⁻²³ mm (1.2e-7 mm), displacements are an i32 number of quanta plus an f32
-//! remainder of at most half a quantum's carry. Differences of near nodes are then exact integers before they become
-//! f32. The range is ±256 mm. In f64 runs the integer part of displacements stays zero.
+//! An f32 displacement of 60 mm resolves 4e-6 mm, so explicit steps of 1e-8 mm would never change it. Reference positions are
+//! therefore whole multiples of a quantum of 2⁻²³ mm (1.2e-7 mm), and displacements are an i32 number of quanta plus an f32
+//! remainder of at most half a quantum's carry. Differences of near nodes are exact integers before they become f32. The range
+//! is ±256 mm. In f64 runs the integer part of displacements stays zero.
 
 use super::interface::{Constant, constants};
 use super::lane::Real;
 
 /// Size of a quantum, mm: 2⁻²³.
 pub const QUANTUM: f64 = 1.0 / 8_388_608.0;
-/// Quanta in a mm.
+/// Quanta per mm.
 pub const QUANTA_PER_MM: f64 = 8_388_608.0;
-/// Largest displacement along an axis, mm; so far inside of the range of quanta that no node leaves it between two looks.
+/// Largest displacement along an axis, mm; far enough inside the range of quanta that no node leaves it between two checks.
 pub const MOST_MM: f64 = 252.0;
-/// What twins know of positions.
+/// Constants of positions shared with the twins.
 pub const CONSTANTS: [Constant; 3] = constants![scalar: QUANTUM, QUANTA_PER_MM, MOST_MM];
 
 /// Nearest whole number of quanta of a coordinate in mm.

@@ -1,21 +1,21 @@
-//! Host state as plain bytes: one function names every field, and serves for writing and for reading back to the bit.
+//! Host state as bytes: one function names every field and serves for both writing and exact restoring.
 
-/// Bytes being written, or being read back.
+/// Bytes being written or read back.
 #[derive(Debug, Clone, Default)]
 pub struct Record {
     bytes: Vec<u8>,
-    /// Where reading goes on; `None` while writing.
+    /// Read position; `None` while writing.
     at: Option<usize>,
     short: bool,
 }
 
 impl Record {
-    /// An empty record to write to.
+    /// An empty record for writing.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A record to read from its start.
+    /// A record for reading from its start.
     pub fn read(bytes: Vec<u8>) -> Self {
         Self { bytes, at: Some(0), short: false }
     }
@@ -24,12 +24,12 @@ impl Record {
         self.bytes
     }
 
-    /// Whether everything that was read was there, and nothing was left.
+    /// Whether every read succeeded and no bytes are left.
     pub fn complete(&self) -> bool {
         !self.short && self.at == Some(self.bytes.len())
     }
 
-    /// Bytes of any number, or as many as there are behind the end of what can be read.
+    /// A byte string of any length; shortened if the record ends early.
     pub fn bytes(&mut self, value: &mut Vec<u8>) {
         let mut count = value.len();
         count.record(self);
@@ -44,7 +44,7 @@ impl Record {
         }
     }
 
-    /// Eight bytes from or to a field; zero behind the end of what can be read.
+    /// Writes or reads eight bytes; reads zero past the end.
     fn word(&mut self, value: &mut u64) {
         match &mut self.at {
             None => self.bytes.extend(value.to_le_bytes()),
@@ -59,7 +59,7 @@ impl Record {
     }
 }
 
-/// A value that a record can hold: `record` writes it, or replaces it by what was written.
+/// A value that a record can hold: `record` writes it, or replaces it by the recorded value.
 pub trait Recorded {
     fn record(&mut self, record: &mut Record);
 }
@@ -120,7 +120,7 @@ impl<T: Recorded + Default> Recorded for Vec<T> {
         let mut count = self.len();
         count.record(record);
         if let Some(at) = record.at {
-            // an item takes at least a byte: a damaged count cannot ask for more than there is
+            // an item takes at least one byte, so a damaged count cannot request more items than there are bytes
             self.clear();
             self.resize_with(count.min(record.bytes.len().saturating_sub(at)), T::default);
         }

@@ -1,27 +1,27 @@
-//! The row of schedule data that one time step needs. Everything else is in buffers.
+//! The schedule data of one time step. Everything else is in buffers.
 
 use super::lane::Real;
 use bytemuck::{Pod, Zeroable};
 
-/// What the schedule prescribes at one step. Units: mm, s.
+/// Prescribed values at one step. Units: mm, s.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Row<R> {
-    /// F̄ − I, rows first.
+    /// F̄ − I, row by row.
     pub gradient: [[R; 3]; 3],
     /// Ḟ̄ over the last half step, 1/s.
     pub rate: [[R; 3]; 3],
-    /// Step from this position to the next, s.
+    /// Time from this position to the next, s.
     pub dt: R,
-    /// Mean of the last and this step, s: the step of the velocity.
+    /// Mean of the previous and this step, s: the time step of the velocity.
     pub dt_mid: R,
-    /// Share of the thermal strain that acts.
+    /// Active share of the thermal strain.
     pub thermal: R,
-    /// Its increment since the step before.
+    /// Its increment since the previous step.
     pub thermal_increment: R,
     /// Contact radius over full radius.
     pub radius: R,
-    /// Its increment since the step before.
+    /// Its increment since the previous step.
     pub radius_increment: R,
     /// Damping rate of solids, 1/s.
     pub damping_solid: R,
@@ -29,7 +29,7 @@ pub struct Row<R> {
     pub damping_thread: R,
     /// Acceleration of the amplitude of prescribed motion, 1/s².
     pub motion: R,
-    /// Bound on how fast two near bodies can approach each other, mm/s.
+    /// Upper bound of the approach speed of two near bodies, mm/s.
     pub approach: R,
 }
 

@@ -1,19 +1,19 @@
-//! The WGSL twin of a kernel, and its text: files under `shaders/` put together for one stage.
+//! The WGSL twin of a kernel, and its text: files under `shaders/` composed for one stage.
 //!
 //! A twin has the path and the function names of its Rust file and repeats the same statements for one item. A kernel is a
-//! function of the number of an item (of a share of an item, if several invocations work on it), or of a share and the
-//! number of the invocation if a workgroup does. Its text starts with the constants and the bindings that Rust declares for it (see
-//! [`super::interface`]; of the constants, those that it uses), and ends with the entry point, `kernel/stage`, which calls it; lines
+//! function of an item number (or of the share of an item, if several invocations work on it), or of a share and the invocation
+//! number if a workgroup works on it. Its text starts with the constants and bindings that Rust declares for it (see
+//! [`super::interface`]; only the constants that it uses), and ends with the entry point, `kernel/stage`, which calls it. Lines
 //! that begin with `#` direct the composition:
 //!
-//! - `#include "kernel/math"` puts a file there, the first time it is asked for; `#include LAW` the file of the law
-//!   of the stage,
-//! - `#if NAME`, `#else`, `#endif` keep lines only if the name is defined, so that an effect that a scene does not have leaves
-//!   no text. Defined are the names that the kernel gives, its own name, `ROOT` in the file of the kernel itself (its kernels are
-//!   not for the files that include it), and what `#define NAME` added.
+//! - `#include "kernel/math"` inserts a file at its first occurrence; `#include LAW` inserts the file of the material law of
+//! the stage,
+//! - `#if NAME`, `#else`, `#endif` keep lines only if the name is defined, so that an inactive effect leaves no text. The
+//! defined names are those given by the kernel, its own name, `ROOT` in the file of the kernel itself (whose kernels are not
+//! for the files that include it), and names added by `#define NAME`.
 //!
-//! Every line of the text knows the file and the line it comes from. Group 0 holds the row of the step, group 1 the buffers of
-//! the stage at the numbers of the kernel's slots, group 2 the range of items and the parameters of the stage.
+//! Every line of the text records its source file and line. Group 0 holds the row of the step, group 1 the buffers of the stage
+//! at the slot numbers of the kernel, group 2 the range of items and the parameters of the stage.
 
 use super::interface::Constant;
 use super::stage::Stage;
@@ -24,41 +24,41 @@ use std::fmt::Write as _;
 
 static SHADERS: Dir = include_dir!("$CARGO_MANIFEST_DIR/shaders");
 
-/// The file with the entry point, and the name of that.
+/// The file with the entry point, and the name of the entry point.
 const STAGE: &str = "kernel/stage";
 pub const ENTRY: &str = "main";
 
-/// Invocations of a workgroup.
+/// Invocations per workgroup.
 pub const WORKGROUP: usize = 64;
 
-/// Where the twin of a kernel is and how it is built.
+/// Location of the twin of a kernel, and its build options.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Shader {
     /// File under `shaders/`, without its suffix.
     pub file: &'static str,
     /// Name of the function.
     pub kernel: &'static str,
-    /// Names that `#if` finds defined; see [`when`].
+    /// Names defined for `#if`; see [`when`].
     pub defines: &'static [&'static str],
-    /// What `#include LAW` stands for.
+    /// The file for `#include LAW`.
     pub law: Option<&'static str>,
-    /// Who works on one item.
+    /// Invocations or workgroups per item.
     pub share: Share,
-    /// Constants that its files may use, module by module.
+    /// Constants available to its files, module by module.
     pub constants: &'static [&'static [Constant]],
 }
 
-/// How many work on one item of a stage.
+/// Number of invocations or workgroups per item of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Share {
-    /// So many invocations.
+    /// This number of invocations.
     Invocations(usize),
-    /// So many workgroups.
+    /// This number of workgroups.
     Workgroups(usize),
 }
 
 impl Share {
-    /// Invocations that work on one item.
+    /// Invocations per item.
     pub fn invocations(self) -> usize {
         match self {
             Self::Invocations(count) => count,
@@ -68,26 +68,26 @@ impl Share {
 }
 
 impl Shader {
-    /// One invocation an item, nothing defined.
+    /// One invocation per item, no names defined.
     pub const fn new(file: &'static str, kernel: &'static str) -> Self {
         Self { file, kernel, defines: &[], law: None, share: Share::Invocations(1), constants: &[] }
     }
 }
 
-/// A name that is defined only for kernels with a flag.
+/// A name defined only for kernels with a flag.
 pub const fn when(flag: bool, name: &'static str) -> &'static str {
     if flag { name } else { "" }
 }
 
-/// The text of a stage's shader, and where its lines come from.
+/// The text of a stage's shader, and the origin of its lines.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Text {
     pub text: String,
-    /// File and line of every line.
+    /// Source file and line of every line.
     pub lines: Vec<(&'static str, usize)>,
 }
 
-/// The files on their way into a text.
+/// Composes files into a text.
 struct Composer {
     shader: Shader,
     text: Text,
@@ -99,7 +99,7 @@ impl Text {
     /// The text of a stage.
     ///
     /// # Errors
-    /// A file that is not there, or a directive that makes no sense, by file and line.
+    /// A missing file, or an invalid directive, with its file and line.
     pub fn of(stage: &Stage) -> Result<Self> {
         let shader = stage.kernel.shader;
         let (shares, of_workgroups): (_, &[_]) = match shader.share {
@@ -137,7 +137,7 @@ impl Text {
         self.lines.push(from);
     }
 
-    /// All words outside of comments.
+    /// All words outside comments.
     pub fn words(&self) -> HashSet<&str> {
         let code = self.text.lines().map(|line| line.split("//").next().unwrap_or_default());
         code.flat_map(|code| code.split(|c: char| !c.is_ascii_alphanumeric() && c != '_')).collect()
@@ -146,7 +146,7 @@ impl Text {
     /// The module, parsed and validated.
     ///
     /// # Errors
-    /// What is wrong, by file and line of the source.
+    /// The fault, with file and line of its source.
     #[cfg(feature = "gpu")]
     pub fn module(&self) -> Result<(naga::Module, naga::valid::ModuleInfo)> {
         let module = naga::front::wgsl::parse_str(&self.text).map_err(|error| {

@@ -10,7 +10,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
-/// A buffer to bind to a slot, if there is one, and how many numbers an item owns in it where only the plan knows.
+/// The buffer to bind to a slot, if any, and the number of entries per item if only the plan knows it.
 #[derive(Debug, Clone, Copy)]
 pub struct Wire {
     buffer: Option<Buffer>,
@@ -45,7 +45,7 @@ macro_rules! wires {
 }
 pub(crate) use wires;
 
-/// One parallel loop over items. Only the crate makes stages: a kernel trusts that its slots are bound as it declares them.
+/// One parallel loop over items. Only the crate makes stages: a kernel relies on its slots being bound as declared.
 #[derive(Clone)]
 pub struct Stage {
     pub(crate) name: &'static str,
@@ -53,27 +53,27 @@ pub struct Stage {
     pub(crate) first: usize,
     /// Number of items.
     pub(crate) count: usize,
-    /// Items in one chunk of work; fixed, so that results do not depend on the number of threads.
+    /// Items per chunk of work; fixed, so that results do not depend on the number of threads.
     pub(crate) grain: usize,
-    /// Buffers of the slots that are there: those that are read.
+    /// Buffers of the active slots that are read.
     pub(crate) reads: Vec<Buffer>,
-    /// Those that are written, numbered after the reads.
+    /// Buffers of the active slots that are written, numbered after the reads.
     pub(crate) writes: Vec<(Buffer, Access)>,
     /// Small constants of the stage, laid out as the kernel's `Params`.
     pub(crate) params: Vec<u8>,
-    /// Constants of the scene in the text of the shader.
+    /// Scene constants for the text of the shader.
     pub(crate) constants: Vec<(&'static str, usize)>,
     pub(crate) kernel: Code,
-    /// Whether it must wait for the stages before it; else it may run beside them.
+    /// Whether it waits for the previous stages; else it may run beside them.
     pub(crate) waits: bool,
 }
 
 impl Stage {
-    /// A stage over `count` items in chunks of `grain` that waits for those before it. A slot that is not there needs no buffer.
+    /// A stage over `count` items in chunks of `grain` that waits for the previous stages. An inactive slot needs no buffer.
     ///
     /// # Panics
-    /// On a slot without its buffer, a buffer without a slot, a stride that does not fit, and a buffer that is written through one
-    /// slot and bound to another.
+    /// If a slot has no buffer, a buffer has no slot, a stride does not fit, or a buffer is written through one slot and bound
+    /// to another.
     pub(crate) fn new(
         name: &'static str,
         kernel: Code,
@@ -102,7 +102,7 @@ impl Stage {
         Self { name, first: 0, count, grain, reads, writes, params, constants: Vec::new(), kernel, waits: true }
     }
 
-    /// A stage of a kernel outside of the crate, over some items and buffers by the names of its slots.
+    /// A stage of a kernel from outside the crate, with its items, and buffers by slot name.
     ///
     /// # Safety
     /// No two items of the kernel write to the same number of a buffer that it binds with [`Access::Scatter`].
@@ -116,7 +116,7 @@ impl Stage {
         Self { first: items.start, ..stage }
     }
 
-    /// The stage, free to run beside those before it.
+    /// Lets the stage run beside the previous ones.
     pub(crate) fn beside(self) -> Self {
         Self { waits: false, ..self }
     }
@@ -127,22 +127,22 @@ impl Stage {
         Self { count, grain: count, ..self.clone() }
     }
 
-    /// Name in messages, timings and `check --explain`.
+    /// Name for messages, timings and `check --explain`.
     pub fn name(&self) -> &'static str {
         self.name
     }
 
-    /// The items.
+    /// The range of items.
     pub fn items(&self) -> Range<usize> {
         self.first..self.first + self.count
     }
 
-    /// Buffers that are read, in the order of the slots of the kernel.
+    /// Buffers that are read, in slot order.
     pub fn reads(&self) -> &[Buffer] {
         &self.reads
     }
 
-    /// Buffers that are written, in the order of the slots of the kernel.
+    /// Buffers that are written, in slot order.
     pub fn writes(&self) -> &[(Buffer, Access)] {
         &self.writes
     }
@@ -162,15 +162,15 @@ impl Stage {
 #[derive(Default, Clone)]
 pub struct Plan {
     pub buffers: Vec<Description>,
-    /// Run when the contact candidates are used up.
+    /// Stages to run when the contact skin is used up.
     pub search: Vec<Stage>,
-    /// Run every time step.
+    /// Stages of every time step.
     pub step: Vec<Stage>,
-    /// Run every few steps, to see whether a search is due.
+    /// Stages to run every few steps, to check whether a search is due.
     pub watch: Vec<Stage>,
-    /// Run when energies and limits are wanted.
+    /// Stages to run when energies and limits are needed.
     pub diagnose: Vec<Stage>,
-    /// Run after that, to add up what the host reads.
+    /// Stages to run afterwards, to sum what the host reads.
     pub collect: Vec<Stage>,
 }
 
@@ -180,12 +180,12 @@ impl Plan {
         (0..self.buffers.len()).map(Buffer)
     }
 
-    /// The buffer of a name, if there is one.
+    /// The buffer with this name, if any.
     pub fn named(&self, name: &str) -> Option<Buffer> {
         self.buffers.iter().position(|buffer| buffer.name == name).map(Buffer)
     }
 
-    /// What a buffer is.
+    /// The description of a buffer.
     pub fn describe(&self, buffer: Buffer) -> &Description {
         &self.buffers[buffer.0]
     }
@@ -195,15 +195,16 @@ impl Plan {
 pub trait Kernel: 'static {
     /// Its WGSL twin.
     const SHADER: Shader;
-    /// The buffers that it binds.
+    /// Its buffer bindings.
     const SLOTS: &'static [Slot];
-    /// Whether it works on registers, and gains from the widest; one that works number by number is compiled for fewer.
+    /// Whether it works on registers and benefits from the widest; a kernel that works number by number is compiled for fewer
+    /// widths.
     const WIDE: bool = true;
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>);
 }
 
-/// The code of a kernel with flags: `flagged!(Integrate; lines, gravity)` is that of `Integrate<true, false>` if there are lines and
-/// there is no gravity.
+/// The code of a kernel with flags: `flagged!(Integrate; lines, gravity)` gives `Integrate<true, false>` if there are lines and
+/// no gravity.
 macro_rules! flagged {
     ($($kernel:ident)::+; $($flag:expr),+) => { flagged!(@ ($($kernel)::+) []; $($flag),+) };
     (@ ($($kernel:tt)+) [$($known:tt)*]; $flag:expr $(, $rest:expr)*) => {
@@ -217,7 +218,7 @@ macro_rules! flagged {
 }
 pub(crate) use flagged;
 
-/// A kernel as function pointers for the CPU, where its WGSL twin is, and what both bind.
+/// A kernel as function pointers for the CPU, the location of its WGSL twin, and their common bindings.
 #[derive(Clone, Copy)]
 pub struct Code {
     pub f32: fn(&Io<f32>, Range<usize>),
@@ -248,13 +249,13 @@ fn run<K: Kernel, R: Real>(io: &Io<R>, items: Range<usize>) {
 #[derive(Clone, Copy)]
 pub struct Binding {
     pub address: *mut u8,
-    /// Numbers, and bytes of one.
+    /// Length in numbers, and bytes per number.
     pub len: usize,
     pub size: usize,
     pub access: Option<Access>,
 }
 
-/// What a kernel sees of one chunk: its buffers, the row of the step and its parameters.
+/// A kernel's view of one chunk: its buffers, the row of the step and its parameters.
 pub struct Io<'a, R: Real> {
     pub(crate) bindings: &'a [Binding],
     pub row: &'a Row<R>,
@@ -268,7 +269,7 @@ pub struct Io<'a, R: Real> {
 unsafe impl<R: Real> Sync for Io<'_, R> {}
 
 impl<R: Real> Io<'_, R> {
-    /// A buffer, whose numbers have the size that the kernel takes them to have.
+    /// A buffer; checks the size of its numbers against the type used by the kernel.
     fn binding<T>(&self, index: usize) -> Binding {
         let b = self.bindings[index];
         assert_eq!(b.size, size_of::<T>(), "buffer {index} holds other numbers");
@@ -312,14 +313,14 @@ impl<R: Real> Io<'_, R> {
         }
     }
 
-    /// A buffer in which items write to disjoint places named by a table.
+    /// A buffer in which items write to disjoint places given by a table.
     pub fn scatter<T: Pod>(&self, index: usize) -> Scatter<'_, T> {
         let b = self.binding::<T>(index);
         assert_eq!(b.access, Some(Access::Scatter), "buffer {index} is not bound as Scatter");
         Scatter { address: b.address.cast(), len: b.len, life: PhantomData }
     }
 
-    /// Signed integers that every item may add to.
+    /// Signed integers to which every item may add.
     pub fn atomics(&self, index: usize) -> &[AtomicI32] {
         let b = self.binding::<AtomicI32>(index);
         assert_eq!(b.access, Some(Access::Atomic), "buffer {index} is not bound as Atomic");
@@ -327,7 +328,7 @@ impl<R: Real> Io<'_, R> {
         unsafe { std::slice::from_raw_parts(b.address.cast(), b.len) }
     }
 
-    /// Unsigned integers that every item may add to.
+    /// Unsigned integers to which every item may add.
     pub fn atomic_uints(&self, index: usize) -> &[AtomicU32] {
         let b = self.binding::<AtomicU32>(index);
         assert_eq!(b.access, Some(Access::Atomic), "buffer {index} is not bound as Atomic");
@@ -408,7 +409,7 @@ impl<T: Pod> Scatter<'_, T> {
     }
 }
 
-/// Raises a shared maximum of non-negative numbers, kept as the bits of an f32.
+/// Raises a shared maximum of non-negative numbers, stored as the bits of an f32.
 #[inline(always)]
 pub fn raise<R: Real>(place: &AtomicU32, value: R) {
     let bits = (value.to_f64() as f32).to_bits();
@@ -422,7 +423,7 @@ mod tests {
     use super::*;
     use crate::kernel::exact::Exact;
 
-    /// Why a stage of [`Exact`] cannot bind these buffers.
+    /// The reason why a stage of [`Exact`] cannot bind these buffers.
     fn refused(wires: &[(&'static str, Wire)]) -> String {
         let bind = || Stage::new("march", Code::of::<Exact>(), (1, 1), wires, [0u32; 0]);
         let reason = std::panic::catch_unwind(std::panic::AssertUnwindSafe(bind)).err().expect("it is refused");

@@ -1,5 +1,5 @@
-//! Vectors of three numbers, for the kernels that work one item at a time. Products and sums are rounded one by one: a fused
-//! operation costs a call wherever the compiler leaves the functions of an instruction set.
+//! Vectors of three numbers, for kernels that work one item at a time. Products and sums are rounded separately: a fused
+//! operation costs a function call wherever the compiler leaves the functions of an instruction set.
 
 use super::lane::Lane;
 

@@ -1,15 +1,15 @@
-//! Crossings of warp and weft: how far the plies have sheared there, how far they have slipped, and the gaps beside them.
+//! Crossings of warp and weft: shear and slip of the plies at each crossing, and the gaps next to it.
 //!
-//! The mid-line of a yarn joins the means of its sections. In the reference state every pair of mid-lines that cross in
-//! the plane (x, y) marks one material point on each yarn. Later:
-//! - the position is where the two mid-lines cross now, midway between them in z;
-//! - the effective shear angle is the angle between the mid-lines in the reference state less that now. The direction of
-//!   a mid-line at a section is that from the section before to the section after, linear in between;
-//! - directions are those of the mid-lines there, turned to point along the axis of the shear;
-//! - slip is the distance in the plane between the two material points;
-//! - widths and gaps are those of the nearest stations ([`yarns`](super::yarns)).
+//! The mid-line of a yarn joins the centroids of its section nodes. In the reference state every pair of mid-lines that cross
+//! in the plane (x, y) marks one material point on each yarn. In a deformed state:
+//! - the position is the current crossing of the two mid-lines, midway between them in z;
+//! - the effective shear angle is the angle between the mid-lines in the reference state minus the current angle. The direction
+//! of a mid-line at a section is the vector from the previous to the next section, linear in between;
+//! - the directions are the mid-line directions at the crossing, oriented along the axis of the shear;
+//! - the slip is the in-plane distance between the two material points;
+//! - widths and gaps are taken from the nearest stations ([`yarns`](super::yarns)).
 //!
-//! Without slip the effective angle of trellis shear is its γ, and slip is zero.
+//! Without slip the effective angle of trellis shear is its γ, and the slip is zero.
 
 use super::Spread;
 use super::yarns::Yarn;
@@ -18,9 +18,9 @@ use crate::mesh::frame::Frame;
 use crate::mesh::{Block, Mesh, Ply};
 use glam::{DVec2, DVec3, Vec3Swizzles};
 
-/// Periodic images that are looked at, in cells to each side.
+/// Range of the periodic images searched, in cells to each side.
 const REACH: i32 = 2;
-/// Share of a segment by which crossings may lie outside, so that rounding loses none at a joint.
+/// Tolerance beyond the ends of a segment, as a share of its length, so that rounding loses no crossing at a joint.
 const MARGIN: f64 = 1e-9;
 
 /// A pair of yarns that cross in the reference state.
@@ -29,15 +29,15 @@ pub struct Pair {
     /// Indices of the blocks.
     pub warp: usize,
     pub weft: usize,
-    /// Where they cross in the reference state, mm.
+    /// Crossing in the reference state, mm.
     pub reference: DVec2,
-    /// Image of the warp, in periods, where it crosses the weft.
+    /// Periodic image of the warp at the crossing, in periods.
     image: [i32; 2],
-    /// Places along warp and weft, in slices.
+    /// Positions along warp and weft, in slices.
     at: [f64; 2],
-    /// Reference directions with a part along the axis, as signs on those of the mid-lines.
+    /// Signs that orient the mid-line directions along the axis, in the reference state.
     signs: [f64; 2],
-    /// Which way warp and weft are turned against each other, and the angle of [`turn`], in the reference state.
+    /// Relative orientation of warp and weft, and the angle of [`turn`], in the reference state.
     side: f64,
     rest: f64,
 }
@@ -45,28 +45,28 @@ pub struct Pair {
 /// A crossing in a deformed state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
-    /// Where the mid-lines cross, mm; NaN if they do no longer.
+    /// Crossing of the mid-lines, mm; NaN if they cross no longer.
     pub position: DVec3,
     /// Effective shear angle, rad; NaN if the mid-lines cross no longer.
     pub angle: f64,
-    /// Directions of warp and weft along the axis, rad from x; NaN as well.
+    /// Directions of warp and weft along the axis, rad from x; NaN if the mid-lines cross no longer.
     pub direction: [f64; 2],
-    /// Way of the weft's material point from the warp's, mm.
+    /// Vector from the warp's material point to the weft's, mm.
     pub slip: DVec2,
     /// Width and gap of warp and weft at their nearest stations, mm.
     pub width: [f64; 2],
     pub gap: [f64; 2],
 }
 
-/// All crossings of a mesh, in the order of its warps, then its wefts.
+/// All crossings of a mesh, ordered by warp, then by weft.
 #[derive(Debug, Clone)]
 pub struct Crossings {
     pub pairs: Vec<Pair>,
 }
 
 impl Crossings {
-    /// Crossings of a mesh. Shear is positive where it turns the yarns towards `axis`: the direction of the pull, or the
-    /// diagonal (1, 1) of a cell.
+    /// Crossings of a mesh. Shear is positive if it turns the yarns towards `axis`: the direction of the pull, or the diagonal
+    /// (1, 1) of a cell.
     pub fn of(mesh: &Mesh, axis: DVec2) -> Self {
         let frame = Frame { gradient: [[1.0, 0.0], [0.0, 1.0]], positions: mesh.nodes.clone(), ..Frame::default() };
         let lines = midlines(mesh, &frame);
@@ -85,7 +85,7 @@ impl Crossings {
         Self { pairs }
     }
 
-    /// Every crossing in a deformed state; `yarns` are the sizes of its yarns.
+    /// Measures every crossing in a deformed state; `yarns` are the yarn sizes in that state.
     ///
     /// # Errors
     /// A frame or yarns of another mesh.
@@ -122,8 +122,8 @@ impl Crossings {
         Ok(self.pairs.iter().map(crossing).collect())
     }
 
-    /// A value of the crossings on every hexahedron, blocks in order: linear along each yarn between its crossings, the nearest
-    /// one's beyond them, NaN on yarns without any.
+    /// A crossing value on every hexahedron, blocks in order: linear along each yarn between its crossings, constant beyond the
+    /// first and last, NaN on yarns without crossings.
     pub fn along_yarns(&self, mesh: &Mesh, crossings: &[Crossing], value: impl Fn(&Crossing) -> f64) -> Vec<f64> {
         let mut values = Vec::with_capacity(mesh.hexes());
         for (number, block) in mesh.blocks.iter().enumerate() {
@@ -141,7 +141,7 @@ impl Crossings {
     }
 }
 
-/// Value at a place among (place, value) in rising order: linear between two, constant beyond the first and last.
+/// Value at a position from pairs (position, value) in increasing order: linear between two, constant beyond the first and last.
 fn between(points: &[[f64; 2]], at: f64) -> f64 {
     let after = points.partition_point(|p| p[0] < at);
     match (after.checked_sub(1).and_then(|i| points.get(i)), points.get(after)) {
@@ -174,12 +174,12 @@ fn candidates(mesh: &Mesh) -> impl Iterator<Item = (usize, usize)> {
     of(Ply::Warp).flat_map(move |warp| of(Ply::Weft).map(move |weft| (warp, weft)))
 }
 
-/// 90° less the angle between two directions, once signs have made them point along the axis.
+/// 90° minus the angle between two directions oriented along the axis by their signs.
 fn turn([a, b]: [DVec2; 2], [p, q]: [f64; 2], side: f64) -> f64 {
     (p * q * a.dot(b)).atan2(side * p * q * a.perp_dot(b))
 }
 
-/// Index of the station nearest to a place along a block, among those that yarns are measured at.
+/// Index of the measured station nearest to a position along a block.
 fn station(block: &Block, at: f64) -> usize {
     let nearest = at.round().max(0.0) as usize;
     match block.wrap {
@@ -191,7 +191,7 @@ fn station(block: &Block, at: f64) -> usize {
 /// A mid-line at slice boundaries 0 ..= slices, mm.
 struct Midline {
     points: Vec<DVec3>,
-    /// Not of unit length.
+    /// Not normalised.
     directions: Vec<DVec2>,
     low: DVec2,
     high: DVec2,
@@ -212,7 +212,7 @@ impl Midline {
         let last = block.slices;
         let along = |a: usize, b: usize| (points[b] - points[a]).xy();
         let direction = |s: usize| match block.wrap {
-            // across the seam, the section before the first is the last but one, one turn back
+            // across the seam, the section before the first is the last but one, one period back
             Some(_) if s == 0 || s == last => along(0, 1) + along(last - 1, last),
             _ => along(s.saturating_sub(1), (s + 1).min(last)),
         };
@@ -222,7 +222,7 @@ impl Midline {
         Self { low, high, directions, points }
     }
 
-    /// Slice and share of it at a place along the line.
+    /// Slice, and share of the slice, at a position along the line.
     fn split(&self, at: f64) -> (usize, f64) {
         let slice = (at.max(0.0) as usize).min(self.points.len() - 2);
         (slice, at - slice as f64)
@@ -233,7 +233,7 @@ impl Midline {
         self.points[s] + t * (self.points[s + 1] - self.points[s])
     }
 
-    /// Unit direction at a place.
+    /// Unit direction at a position.
     fn direction(&self, at: f64) -> DVec2 {
         let (s, t) = self.split(at);
         let [a, b] = [self.directions[s], self.directions[s + 1]].map(unit);
@@ -241,16 +241,16 @@ impl Midline {
     }
 }
 
-/// Where two mid-lines cross.
+/// A crossing of two mid-lines.
 struct Hit {
     /// Image of the first line.
     image: [i32; 2],
-    /// Places along both lines, in slices.
+    /// Positions along both lines, in slices.
     at: [f64; 2],
     place: DVec2,
 }
 
-/// All crossings of a warp, in the images around, with a weft.
+/// All crossings of a warp, in its nearby periodic images, with a weft.
 fn hits([warp, weft]: [&Midline; 2], mesh: &Mesh, frame: &Frame) -> Vec<Hit> {
     let reach = if mesh.period.is_some() { REACH } else { 0 };
     let images = (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| [i, j]));
@@ -277,7 +277,7 @@ fn hits([warp, weft]: [&Midline; 2], mesh: &Mesh, frame: &Frame) -> Vec<Hit> {
     found
 }
 
-/// Without overflow in between.
+/// Vector length without intermediate overflow.
 fn length(v: DVec2) -> f64 {
     v.x.hypot(v.y)
 }

@@ -1,5 +1,5 @@
-//! What is read off a deformed state: sizes of yarns, crossings of the plies, tension of the stitch, and the relations between shear angle and force.
-//! Measures return plain values; they write nothing.
+//! Measures of a deformed state: yarn sizes, crossings of the plies, stitch tension, and the relations between shear angle and
+//! force. Measures return plain values and write nothing.
 
 pub mod crossings;
 pub mod shear;
@@ -12,12 +12,12 @@ pub struct Spread {
     pub mean: f64,
     pub min: f64,
     pub max: f64,
-    /// Of the samples themselves (divided by their number).
+    /// Standard deviation of the samples themselves (divided by their number).
     pub std: f64,
 }
 
 impl Spread {
-    /// Spread of samples of equal weight. Samples that are NaN are left out.
+    /// Spread of equally weighted samples; NaN samples are ignored.
     pub fn of(samples: impl Iterator<Item = f64> + Clone) -> Self {
         let samples = samples.filter(|v| !v.is_nan());
         let count = samples.clone().count() as f64;

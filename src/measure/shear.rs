@@ -1,4 +1,4 @@
-//! Shear angle, macroscopic gradient and normalised shear force.
+//! Shear angle, macroscopic deformation gradient and normalised shear force.
 //!
 //! Angles are in radians, lengths in mm, forces in N, normalised forces in N/mm.
 //!
@@ -10,7 +10,7 @@
 //! F_m dd/dγ = F_s L · 2 sin(45° − γ/2) cos(45° − γ/2) = F_s L sin(90° − γ) = F_s L cos γ,
 //!
 //! and since Eq. 17 defines F_nor = F_s L / l², with A₀ = l² the reference area, dW/dγ = F_nor A₀ cos γ. A homogenised
-//! cell under the same kinematics has dW/dγ = V P̄ : dF̄/dγ, with P̄ the mean first Piola stress, hence
+//! cell under the same kinematics has dW/dγ = V P̄ : dF̄/dγ, with P̄ the mean first Piola–Kirchhoff stress, hence
 //!
 //! F_nor = (V P̄ : dF̄/dγ) / (A₀ cos γ).
 
@@ -24,7 +24,7 @@ pub fn trellis(angle: f64) -> [[f64; 2]; 2] {
     [[c, s], [s, c]]
 }
 
-/// F̄ of trellis shear with its fibre directions x and y stretched: their images have these lengths.
+/// F̄ of trellis shear with stretched fibre directions x and y: `stretch` gives the lengths of their images.
 pub fn gradient(angle: f64, stretch: [f64; 2]) -> [[f64; 2]; 2] {
     trellis(angle).map(|row| [row[0] * stretch[0], row[1] * stretch[1]])
 }
@@ -35,20 +35,20 @@ pub fn gradient_rate(angle: f64, stretch: [f64; 2]) -> [[f64; 2]; 2] {
     [[-0.5 * s * stretch[0], 0.5 * c * stretch[1]], [0.5 * c * stretch[0], -0.5 * s * stretch[1]]]
 }
 
-/// Shear angle of any in-plane gradient: 90° less the angle between the images of x and y.
+/// Shear angle of any in-plane gradient: 90° minus the angle between the images of x and y.
 pub fn angle_of([[a, b], [c, d]]: [[f64; 2]; 2]) -> f64 {
     (a * b + c * d).atan2(a * d - b * c)
 }
 
-/// Normalised shear force from virtual power, N/mm: `stress` is V P̄, the first Piola stress summed over the volume of the
-/// cell, N·mm (row: force direction); `area` is the reference area A₀, mm².
+/// Normalised shear force from virtual power, N/mm. `stress` is V P̄, the first Piola–Kirchhoff stress integrated over the
+/// volume of the cell, N·mm (row: force direction); `area` is the reference area A₀, mm².
 pub fn normalised_force(stress: [[f64; 2]; 2], angle: f64, stretch: [f64; 2], area: f64) -> f64 {
     let rate = gradient_rate(angle, stretch);
     let power: f64 = stress.iter().flatten().zip(rate.iter().flatten()).map(|(p, f)| p * f).sum();
     power / (area * angle.cos())
 }
 
-/// F_nor of a periodic cell from row to row, N/mm: since ∫ A₀ F_nor cos γ dγ is the external work, the work between two angles
+/// F_nor of a periodic cell from row to row, N/mm. Since ∫ A₀ F_nor cos γ dγ is the external work, the work between two angles
 /// gives the mean force.
 #[derive(Debug, Clone, Copy)]
 pub struct CellCurve {
@@ -58,12 +58,12 @@ pub struct CellCurve {
 }
 
 impl CellCurve {
-    /// Of a cell that has not been sheared.
+    /// For an unsheared cell.
     pub fn new(mesh: &Mesh) -> Self {
         Self { area: mesh.period.map_or(f64::NAN, |[x, y]| x * y), last: [0.0; 2] }
     }
 
-    /// Goes on from an angle, rad, and the external work up to there, mJ.
+    /// Continues from an angle, rad, and the external work up to that angle, mJ.
     pub fn start(&mut self, angle: f64, work: f64) {
         self.last = [angle, work];
     }
@@ -73,7 +73,7 @@ impl CellCurve {
         self.last[0]
     }
 
-    /// Mean force since the last row; `None` where the angle is the same.
+    /// Mean force since the last row; `None` if the angle has not changed.
     pub fn push(&mut self, angle: f64, work: f64) -> Option<f64> {
         let [before, done] = std::mem::replace(&mut self.last, [angle, work]);
         let turned = libm::sin(angle) - libm::sin(before);
@@ -87,30 +87,30 @@ impl Recorded for CellCurve {
     }
 }
 
-/// Membrane forces along the fibre directions x and y, N per mm of reference width across them: the components of V P̄/A₀ that do
-/// work on their stretches.
+/// Membrane forces along the fibre directions x and y, N per mm of reference width across them: the components of V P̄/A₀ that
+/// are work-conjugate to the stretches.
 pub fn membrane_forces(stress: [[f64; 2]; 2], angle: f64, area: f64) -> [f64; 2] {
     let image = trellis(angle);
     [0, 1].map(|k| (stress[0][k] * image[0][k] + stress[1][k] * image[1][k]) / area)
 }
 
-/// Membrane force along both fibre directions of a cell that is sheared by pulling one corner while the two beside it are free,
-/// N/mm. No work is done where the free corners move, so the tractions on the two sides that meet in the pulled corner are equal;
-/// the balance of moments turns them into the diagonal. A traction p there does p cos(45° − γ/2) on the stretch of either
-/// direction and p sin(45° − γ/2) = F_nor cos γ on the shear angle, so the membrane force is F_nor (1 + sin γ). For negative
-/// angles the other diagonal is pulled.
+/// Membrane force along both fibre directions of a cell sheared by pulling one corner while its two neighbours are free, N/mm.
+/// No work is done at the free corners, so the tractions on the two sides that meet in the pulled corner are equal. The balance
+/// of moments aligns them with the diagonal. The power of a traction p is p cos(45° − γ/2) on the stretch of either direction
+/// and p sin(45° − γ/2) = F_nor cos γ on the shear angle, so the membrane force is F_nor (1 + sin γ). For negative angles the
+/// other diagonal is pulled.
 pub fn corner_force(normalised: f64, angle: f64) -> f64 {
     normalised * 1.0_f64.copysign(angle) * (1.0 + angle.abs().sin())
 }
 
-/// Shear angle in a picture frame of side `side` after the machine has moved by `displacement` (Eq. 15 with 90° for the
-/// printed 45°, so that γ(0) = 0).
+/// Shear angle in a picture frame of side `side` at a machine `displacement` (Eq. 15 with 90° for the printed 45°, so that γ(0)
+/// = 0).
 pub fn frame_angle(displacement: f64, side: f64) -> f64 {
     FRAC_PI_2 - 2.0 * ((SQRT_2 * side + displacement) / (2.0 * side)).acos()
 }
 
-/// Normalised shear force of a picture frame (Eqs 16 and 17), N/mm: `force` is the machine force less that of the empty
-/// frame, N; `side` the frame, `fabric` the side of the sheared square.
+/// Normalised shear force of a picture frame (Eqs 16 and 17), N/mm. `force` is the machine force minus the force of the empty
+/// frame, N; `side` is the side of the frame, `fabric` the side of the sheared square.
 pub fn frame_normalised(force: f64, angle: f64, side: f64, fabric: f64) -> f64 {
     force / (2.0 * (FRAC_PI_4 - 0.5 * angle).cos()) * side / (fabric * fabric)
 }

@@ -1,4 +1,4 @@
-//! Tension of the stitch: how hard its loops and underlaps pull, and which share of it is slack.
+//! Stitch tension: axial forces of loops and underlaps, and their slack share.
 
 use crate::error::{Error, Result};
 use crate::mesh::{Mesh, Part, Thread};
@@ -10,7 +10,7 @@ pub const SLACK_BELOW_N: f64 = 0.02;
 /// Shares at which [`Tension::quantiles_n`] are taken.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
-/// Axial force over some length of thread, every beam weighted by its reference length. All NaN if there is no beam.
+/// Axial force over a length of thread, every beam weighted by its reference length. All NaN if there is no beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tension {
     /// Reference length, mm.
@@ -18,13 +18,13 @@ pub struct Tension {
     pub min_n: f64,
     pub mean_n: f64,
     pub max_n: f64,
-    /// Smallest forces that are not exceeded over at least the shares [`QUANTILES`] of the length, N.
+    /// Smallest forces not exceeded over at least the shares [`QUANTILES`] of the length, N.
     pub quantiles_n: [f64; 5],
     /// Share of the length with a force below [`SLACK_BELOW_N`]; compression is slack.
     pub slack_share: f64,
 }
 
-/// Tension of all threads, and by part of the lap. Threads of inline meshes count only in `all`.
+/// Tension of all threads, and of each part of the lap. Threads of inline meshes count only in `all`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stitches {
     pub all: Tension,
@@ -32,11 +32,11 @@ pub struct Stitches {
     pub underlaps: Tension,
 }
 
-/// A loop or an underlap: neighbouring beams of one part of a lap.
+/// A loop or an underlap: consecutive beams of one part of a lap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
     pub part: Part,
-    /// Middle between its ends and the way from one to the other in the reference state, mm.
+    /// Midpoint of its ends, and the vector between them, in the reference state, mm.
     pub middle: DVec2,
     pub chord: DVec2,
     /// Mean axial force, weighted by reference length, N; compression is negative.
@@ -44,14 +44,14 @@ pub struct Leg {
 }
 
 impl Leg {
-    /// Whether it carries: its mean force is not below [`SLACK_BELOW_N`].
+    /// Whether it bears load: its mean force is at least [`SLACK_BELOW_N`].
     pub fn taut(&self) -> bool {
         self.force_n >= SLACK_BELOW_N
     }
 }
 
-/// Loops and underlaps of all threads from the axial force of every beam, N. Where a closed thread begins within one, it counts
-/// as two.
+/// Loops and underlaps of all threads from the axial force of every beam, N. A leg that contains the seam of a closed thread
+/// counts as two.
 pub fn legs(mesh: &Mesh, forces: &[f64]) -> Result<Vec<Leg>> {
     checked(mesh, forces)?;
     let mut legs = Vec::new();
@@ -85,7 +85,7 @@ fn beam_length(mesh: &Mesh, thread: &Thread, beam: usize) -> f64 {
     a.distance(b)
 }
 
-/// An error unless every beam has a force that is a number.
+/// An error unless every beam has a force that is not NaN.
 fn checked(mesh: &Mesh, forces: &[f64]) -> Result<()> {
     if forces.len() != mesh.beams() {
         let message = format!("{} values where the mesh has {} beams", forces.len(), mesh.beams());
@@ -119,12 +119,12 @@ pub fn measure(mesh: &Mesh, forces: &[f64]) -> Result<Stitches> {
 }
 
 impl Tension {
-    /// From (force, length), forces rising.
+    /// From (force, length) pairs in increasing order of force.
     fn of(sorted: impl Iterator<Item = (f64, f64)> + Clone) -> Self {
         let length_mm: f64 = sorted.clone().map(|(_, l)| l).sum();
         let quantile = |share: f64| {
             let mut below = 0.0;
-            // A rounding margin, so that half of two equal beams is the first of them.
+            // Rounding margin: half the length of two equal beams is the first beam.
             let wanted = share * length_mm * (1.0 - 1e-12);
             sorted.clone().find(|(_, l)| {
                 below += l;

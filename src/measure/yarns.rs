@@ -1,17 +1,16 @@
 //! Width, thickness, gap and broadness of yarns in their deformed state, all in mm.
 //!
-//! Stations are the slice boundaries of a yarn: all of them where it closes on itself, all but the two cut ends where it
-//! does not. At a station, with the nodes of its section and c their mean:
-//! - t is the direction of the deformed centreline in the plane (x, y), from the section before to the section after;
-//!   n is t turned by +90°;
+//! Stations are the slice boundaries of a yarn: all of them for a closed yarn, all except the two cut ends for an open one. At
+//! a station, with the nodes of its section and their mean c:
+//! - t is the in-plane direction (x, y) of the deformed centreline, from the previous to the next section; n is t turned by +90°;
 //! - width is the extent of the nodes along n;
 //! - thickness is the largest distance in z between the top and the bottom node of a column;
-//! - gap is the distance along n from the outermost node on the +n side to the facing edge of the next yarn of the same
-//!   ply. The edge of a yarn is the chain of its outermost nodes; periodic images up to two cells away count.
-//!   Negative: the two overlap in the plane, by at most half the width. NaN: there is no next yarn;
+//! - gap is the distance along n from the outermost node on the +n side to the facing edge of the next yarn of the same ply.
+//! The edge of a yarn is the chain of its outermost nodes; periodic images up to two cells away are included. A negative gap
+//! means that the two overlap in the plane, by at most half the width. NaN means that there is no next yarn;
 //! - broadness is width plus gap.
 //!
-//! Unsheared, an undeformed ply has the broadness p (its pitch); under trellis shear without slip p cos γ.
+//! Without shear an undeformed ply has the broadness p (its pitch); under trellis shear without slip it is p cos γ.
 
 use super::Spread;
 use crate::error::Result;
@@ -48,7 +47,7 @@ impl Yarn {
 }
 
 impl Sizes {
-    /// Spread over all stations of some yarns.
+    /// Spread over all stations of the given yarns.
     fn of<'a>(yarns: impl Iterator<Item = &'a Yarn> + Clone) -> Self {
         let spread =
             |values: fn(&Yarn) -> &Vec<f64>| Spread::of(yarns.clone().flat_map(move |y| values(y).iter().copied()));
@@ -103,7 +102,7 @@ fn thickness(mesh: &Mesh, frame: &Frame, block: &Block, station: usize) -> f64 {
     (0..=block.columns).map(|c| (height(c, block.layers) - height(c, 0)).abs()).fold(f64::NAN, f64::max)
 }
 
-/// A yarn seen along z: centreline and edges at slice boundaries 0 ..= slices, mm.
+/// A yarn in plan view (along z): centreline and edges at slice boundaries 0 ..= slices, mm.
 struct Outline {
     centre: Vec<DVec2>,
     normal: Vec<DVec2>,
@@ -120,7 +119,7 @@ impl Outline {
         };
         let sections: Vec<_> = (0..=block.slices).map(section).collect();
         let centre: Vec<DVec2> = sections.iter().map(|s| s.iter().sum::<DVec2>() / s.len() as f64).collect();
-        // Across the seam of a closed yarn, the section before the first is the last but one, one turn back.
+        // Across the seam of a closed yarn, the section before the first is the last but one, one period back.
         let turn = centre[block.slices] - centre[0];
         let tangent = |s: usize| {
             let last = block.slices;
@@ -142,7 +141,7 @@ impl Outline {
         (self.edges[1][s] - self.edges[0][s]).dot(self.normal[s])
     }
 
-    /// From the +n edge at a station to the nearest facing edge beyond the centre of the own section.
+    /// Gap from the +n edge at a station to the nearest facing edge beyond the centre of its own section.
     fn gap(&self, s: usize, neighbours: &[(&Outline, DVec2)]) -> f64 {
         let (edge, n) = (self.edges[1][s], self.normal[s]);
         let least = (self.centre[s] - edge).dot(n);
@@ -161,7 +160,7 @@ impl Outline {
     }
 }
 
-/// Smallest distance above `least` from `start` along `n` at which a chain of points is crossed, and the crossed segment.
+/// Smallest distance above `least` from `start` along `n` at which the ray crosses a chain of points, and the crossed segment.
 fn crossing(chain: &[DVec2], start: DVec2, n: DVec2, least: f64) -> Option<(f64, usize)> {
     let along = |p: DVec2| (p - start).perp_dot(n);
     let across = |p: DVec2| (p - start).dot(n);
@@ -170,7 +169,7 @@ fn crossing(chain: &[DVec2], start: DVec2, n: DVec2, least: f64) -> Option<(f64,
         .enumerate()
         .filter_map(|(i, ends)| {
             let (a, b) = (along(ends[0]), along(ends[1]));
-            // Closed with a margin: rounding must not lose the seam between two images of a chain.
+            // The segment is closed with a margin, so that rounding does not lose the seam between two images of a chain.
             let margin = 1e-9 * (b - a).abs();
             let crosses = a.min(b) <= margin && a.max(b) >= -margin && margin > 0.0;
             let distance = crosses.then(|| across(ends[0]) + (across(ends[1]) - across(ends[0])) * a / (a - b))?;

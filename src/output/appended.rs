@@ -1,4 +1,4 @@
-//! A file that grows by whole lines while a run goes on, and that a checkpoint can find and cut back.
+//! A file that grows by whole lines during a run, and that a checkpoint can locate and truncate.
 
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions};
@@ -15,13 +15,13 @@ pub struct Appended {
 }
 
 impl Appended {
-    /// Starts a file, replacing any old one.
+    /// Creates a file, replacing any old one.
     pub fn create(path: &Path) -> Result<Self> {
         let file = File::create(path).map_err(|e| Error::file(path, e))?;
         Ok(Self { path: path.to_path_buf(), file, len: 0 })
     }
 
-    /// Opens a file that a run left, to go on behind its last line.
+    /// Opens the file of an earlier run, to append after its last line.
     pub fn open(path: &Path) -> Result<Self> {
         let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(|e| Error::file(path, e))?;
         let len = file.seek(SeekFrom::End(0)).map_err(|e| Error::file(path, e))?;
@@ -32,7 +32,7 @@ impl Appended {
         &self.path
     }
 
-    /// Adds lines in one write: a reader never sees half a line but when the disk is full.
+    /// Appends lines in one write: a reader never sees half a line unless the disk is full.
     pub fn push(&mut self, lines: &[u8]) -> Result<()> {
         self.file.write_all(lines).map_err(|e| Error::file(&self.path, e))?;
         self.len += lines.len() as u64;
@@ -44,13 +44,13 @@ impl Appended {
         self.len
     }
 
-    /// Bytes so far, all of them on the disk.
+    /// Bytes so far, all flushed to the disk.
     pub fn settled(&mut self) -> Result<u64> {
         self.file.sync_data().map_err(|e| Error::file(&self.path, e))?;
         Ok(self.len)
     }
 
-    /// Refuses a file with fewer bytes than it had, or whose lines do not end where they did.
+    /// Refuses a file that is shorter than recorded, or whose lines do not end at the recorded length.
     pub fn check_length(&self, len: u64) -> Result<()> {
         if self.len >= len {
             let mut last = [0];
@@ -72,7 +72,7 @@ impl Appended {
         Err(Error::file(&self.path, message))
     }
 
-    /// Drops everything behind the first `len` bytes.
+    /// Truncates the file to the first `len` bytes.
     pub fn cut(&mut self, len: u64) -> Result<()> {
         let cut = self.file.set_len(len).and_then(|()| self.file.seek(SeekFrom::End(0)));
         self.len = cut.map_err(|e| Error::file(&self.path, e))?;

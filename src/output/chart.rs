@@ -1,11 +1,10 @@
-//! Charts as SVG: curves over a common axis, and maps of coloured points. A page styles them; what they need to be read without it
-//! stands in them.
+//! Charts as SVG: curves over a common axis, and maps of coloured points. A page adds style, but the charts are readable
+//! without it.
 
 use super::colour;
 use std::fmt::Write as _;
 
-/// A curve: its name and its points, and how far values spread to either side of each, if that is known. Points that are not
-/// numbers interrupt it.
+/// A curve: its name, its points and, if known, the spread to either side of each point. NaN points interrupt the curve.
 #[derive(Debug, Clone)]
 pub struct Curve<'a> {
     pub name: &'a str,
@@ -14,7 +13,7 @@ pub struct Curve<'a> {
 }
 
 impl Curve<'_> {
-    /// Points with a known spread: abscissa, and the ends of the band.
+    /// Points with a known spread: abscissa, and both ends of the band.
     fn band(&self) -> Vec<[f64; 3]> {
         let all = self.points.iter().zip(&self.spread).map(|([x, y], s)| [*x, y - s, y + s]);
         all.filter(|ends| ends.iter().all(|v| v.is_finite())).collect()
@@ -23,11 +22,11 @@ impl Curve<'_> {
 
 const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 330.0;
-/// Height of a line of names.
+/// Height of a line of the legend.
 const LINE: f64 = 19.0;
-/// Left, top, right and bottom of the area of the curves.
+/// Left, top, right and bottom of the plot area.
 const AREA: [f64; 4] = [60.0, 32.0, 506.0, 276.0];
-/// Colours that stay apart for most eyes, and dashes that do in print.
+/// Colours that most eyes can distinguish, and dashes for black-and-white print.
 const COLOURS: [&str; 6] = ["#1b5e8c", "#c2571a", "#3f7d3a", "#7a4b94", "#8a6d1f", "#555b63"];
 const DASHES: [&str; 6] = ["none", "7 3", "2 3", "9 3 2 3", "4 2", "1 2"];
 
@@ -40,14 +39,14 @@ pub fn curves(axis: [&str; 2], curves: &[Curve]) -> Option<String> {
     let ends = || bands.iter().flatten().flat_map(|[x, low, high]| [[*x, *low], [*x, *high]]);
     let range = |k: usize| {
         let (low, high) = points().chain(ends()).fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
-        // a curve that stays on one side of zero is seen with it
+        // the axis includes zero, so that a curve on one side of it is shown with it
         let (low, high) = (low.min(0.0), high.max(0.0));
         if high > low { (low, high) } else { (low, low + 1.0) }
     };
     let (xs, ys) = (ticks(range(0)), ticks(range(1)));
     let outer = |t: &[f64]| (t[0], t[t.len() - 1]);
     let (x_range, y_range) = (outer(&xs), outer(&ys));
-    // names in as many lines as they need
+    // the legend takes as many lines as it needs
     let mut places = Vec::new();
     let (mut pen, mut line) = (AREA[0], 0);
     for curve in curves {
@@ -125,8 +124,8 @@ pub fn curves(axis: [&str; 2], curves: &[Curve]) -> Option<String> {
     Some(t)
 }
 
-/// Points in the plane, mm, coloured by a value, with the range of their colours; `None` if there is no point. Without a
-/// `range`, it is that of the values.
+/// Points in the plane, mm, coloured by value, with a colour range; `None` if there is no point. The default `range` is the
+/// range of the values.
 pub fn map(name: &str, points: &[[f64; 3]], range: Option<[f64; 2]>) -> Option<String> {
     let known: Vec<&[f64; 3]> = points.iter().filter(|p| p.iter().all(|x| x.is_finite())).collect();
     let extent = |k: usize| known.iter().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
@@ -183,20 +182,20 @@ pub fn map(name: &str, points: &[[f64; 3]], range: Option<[f64; 2]>) -> Option<S
     Some(t)
 }
 
-/// Five to ten round values that enclose a range, but for a tenth of a step at its low end.
+/// Five to ten round values that enclose a range, except for a tenth of a step at its low end.
 fn ticks((low, high): (f64, f64)) -> Vec<f64> {
     let step = round_step((high - low) / 6.0);
     let (first, last) = ((low / step + 0.1).floor() as i64, (high / step - 1e-9).ceil() as i64);
     (first..=last.max(first + 1)).map(|i| i as f64 * step).collect()
 }
 
-/// Smallest of 1, 2 and 5 times a power of ten that is not below a step.
+/// Smallest value of 1, 2 or 5 times a power of ten that is at least `rough`.
 pub fn round_step(rough: f64) -> f64 {
     let power = 10f64.powf(rough.log10().floor());
     [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= rough * (1.0 - 1e-9)).unwrap_or(rough)
 }
 
-/// A tick with the digits that its neighbours need.
+/// A tick label with as many digits as its neighbours need.
 pub fn label(value: f64, all: &[f64]) -> String {
     let step = (all[all.len().min(2) - 1] - all[0]).abs();
     let largest = all.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
@@ -210,7 +209,7 @@ pub fn label(value: f64, all: &[f64]) -> String {
     format!("{value:.digits$}").replace('-', "−")
 }
 
-/// Text that HTML shows as it is.
+/// Text escaped for HTML.
 pub fn escaped(text: &str) -> String {
     super::vtu::escaped(text)
 }

@@ -1,8 +1,8 @@
-//! Checkpoints: the state of a run in one file, whole or not there, checked when it is read.
+//! Checkpoints: the state of a run in one file, written atomically and verified when read.
 //!
-//! A file is a line of JSON (what the state belongs to and how it is laid out), the host's record and the buffers of the
-//! plan, compressed by zlib, and a hash of everything before it. `DIR/state` holds the last two checkpoints of the run,
-//! and one from the end of each load step; their names begin with the number of the time step.
+//! A file holds one line of JSON (case and layout of the state), then the host's record and the buffers of the plan, compressed
+//! by zlib, and a hash of everything before it. `DIR/state` holds the last two checkpoints of the run and one from the end of
+//! each load step; their names begin with the number of the time step.
 
 use super::file;
 use crate::case::differences::differences;
@@ -18,16 +18,16 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// Folder of the checkpoints in a folder of results.
+/// Folder of the checkpoints in a results folder.
 pub const FOLDER: &str = "state";
-/// Checkpoints that stay, besides those from the end of a load step.
+/// Number of checkpoints kept, besides those from the end of a load step.
 const KEPT: usize = 2;
 const EXTENSION: &str = "state";
 const FORMAT: u32 = 4;
-/// How the header of every checkpoint begins.
+/// First bytes of the header of every checkpoint.
 const START: &[u8] = b"{\"format\":";
 
-/// What a state belongs to, and how it is laid out.
+/// The case that a state belongs to, and the layout of the state.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Version of the layout of this file.
@@ -37,11 +37,11 @@ pub struct Header {
     /// The case with all its defaults.
     pub case: Value,
     pub step: u64,
-    /// Load steps that are complete.
+    /// Number of completed load steps.
     pub phases: usize,
-    /// Written when the last of them had just ended.
+    /// Whether the last of them had just ended.
     pub end_of_step: bool,
-    /// Bytes of the record of the simulation and of that of the run.
+    /// Bytes of the record of the simulation and of the record of the run.
     pub records: [usize; 2],
     /// Names and bytes of the buffers, in the order of the plan.
     pub buffers: Vec<(String, usize)>,
@@ -79,7 +79,7 @@ impl Checkpoint {
         Self { header, records, buffers }
     }
 
-    /// Writes the state to the folder of a run; `name` marks the end of a load step. Older ones make way afterwards.
+    /// Writes the state to the folder of a run; `name` marks the end of a load step. Older checkpoints are removed afterwards.
     pub fn write(mut self, results: &Path, name: Option<&str>) -> Result<()> {
         self.header.end_of_step = name.is_some();
         let folder = results.join(FOLDER);
@@ -89,14 +89,14 @@ impl Checkpoint {
         let path = folder.join(format!("{:012}{name}.{EXTENSION}", self.header.step));
         file::replace(&path, |w| w.write_all(&bytes))?;
         file::settle(&folder)?;
-        // a run that has gone back writes in front of its old ones
+        // after a rollback a run writes checkpoints before its old ones
         let mut passing: Vec<PathBuf> = list(results)?.into_iter().filter(|p| is_passing(p) && *p != path).collect();
         passing.truncate(passing.len().saturating_sub(KEPT - usize::from(is_passing(&path))));
         passing.iter().try_for_each(|old| fs::remove_file(old).map_err(|e| Error::file(old, reason(&e))))
     }
 
     fn bytes(&self) -> Vec<u8> {
-        // neither a list of numbers and texts nor memory can fail to be written
+        // neither serialising plain JSON nor writing to memory can fail
         let mut bytes = serde_json::to_vec(&self.header).expect("a header is plain JSON");
         bytes.push(b'\n');
         let mut encoder = ZlibEncoder::new(bytes, Compression::fast());
@@ -108,17 +108,17 @@ impl Checkpoint {
         bytes
     }
 
-    /// Reads a state and checks that it is whole.
+    /// Reads a state and verifies that it is complete.
     ///
     /// # Errors
-    /// A file that cannot be read, is cut off or damaged, or was written by another version.
+    /// A file that cannot be read, is truncated or damaged, or was written by another version.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = fs::read(path).map_err(|e| Error::file(path, reason(&e)))?;
         let damaged = || {
             let message = "this checkpoint is cut off or damaged: remove it, and the one before it will be used";
             Error::file(path, message)
         };
-        // one that has the name of a checkpoint is a damaged one
+        // a file with the extension of a checkpoint is a damaged checkpoint
         if !bytes.starts_with(START) && path.extension().is_none_or(|e| e != EXTENSION) {
             let message = "is no checkpoint of this program: give one of the files in state/ of a folder of results";
             return Err(Error::file(path, message));
@@ -136,14 +136,14 @@ impl Checkpoint {
         }
         let mut rest = ZlibDecoder::new(&body[line + 1..]);
         let mut part = |len: usize| {
-            // a length that is not true asks for no more than there is
+            // a wrong length cannot request more than the file holds
             let mut part = Vec::new();
             let read = rest.by_ref().take(len as u64).read_to_end(&mut part);
             if read.is_ok_and(|read| read == len) { Ok(part) } else { Err(damaged()) }
         };
         let records = [part(header.records[0])?, part(header.records[1])?];
         let buffers = header.buffers.iter().map(|(_, len)| part(*len)).collect::<Result<_>>()?;
-        // the end of the stream, with its own check
+        // the end of the stream, with its own checksum
         if !matches!(rest.read(&mut [0]), Ok(0)) {
             return Err(damaged());
         }
@@ -153,7 +153,7 @@ impl Checkpoint {
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// All checkpoints in a folder of results, oldest first.
+/// All checkpoints in a results folder, oldest first.
 fn list(results: &Path) -> Result<Vec<PathBuf>> {
     let folder = results.join(FOLDER);
     let fail = |e: std::io::Error| Error::file(&folder, reason(&e));
@@ -164,13 +164,13 @@ fn list(results: &Path) -> Result<Vec<PathBuf>> {
             found.push(path);
         }
     }
-    // the end of a load step comes behind a checkpoint from its last row
+    // the checkpoint from the end of a load step follows the checkpoint from its last row
     let step = |path: &PathBuf| path.file_name().map(|name| name.as_encoded_bytes()[..12.min(name.len())].to_vec());
     found.sort_by_key(|path| (step(path), !is_passing(path)));
     Ok(found)
 }
 
-/// Removes the checkpoints behind a time step, from which a run has gone back.
+/// Removes the checkpoints after a time step to which a run has rolled back.
 pub fn remove_after(results: &Path, step: u64) -> Result<()> {
     let later = |path: &PathBuf| {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -188,13 +188,13 @@ fn is_passing(path: &Path) -> bool {
     path.file_stem().and_then(|s| s.to_str()).is_some_and(|stem| stem.bytes().all(|b| b.is_ascii_digit()))
 }
 
-/// The last checkpoint in a folder of results, if there is one.
+/// The last checkpoint in a results folder, if there is one.
 pub fn latest(results: &Path) -> Result<Option<PathBuf>> {
     let found = if results.join(FOLDER).is_dir() { list(results)? } else { Vec::new() };
     Ok(found.into_iter().last())
 }
 
-/// The first place at which two cases differ, with both values: `here` against `there`. Places in `free` may differ.
+/// The first field in which two cases differ, with both values: `here` against `there`. Fields in `free` may differ.
 pub fn difference(here: &Value, there: &Value, free: &dyn Fn(&str) -> bool) -> Option<String> {
     let found = differences(here, there, free);
     let first = found.first()?;

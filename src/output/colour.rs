@@ -1,14 +1,14 @@
 //! Colours: linear RGB from perceptual coordinates, the colour map of fields, and the colours of bodies.
 //!
 //! OKLab after B. Ottosson (2020), <https://bottosson.github.io/posts/oklab/>. The map rises evenly in lightness from violet
-//! over blue and green to yellow, so that equal steps of a field look equal, also in print without colour.
+//! over blue and green to yellow, so that equal steps of a field look equal, also in greyscale print.
 
 use glam::Vec3;
 
 /// Linear RGB, 0 to 1.
 pub type Rgb = Vec3;
 
-/// Linear RGB of a lightness (0 to 1), chroma (about 0 to 0.2) and hue in degrees, clipped to what a screen can show.
+/// Linear RGB of a lightness (0 to 1), chroma (about 0 to 0.2) and hue in degrees, clipped to the gamut of a screen.
 pub fn oklch(lightness: f32, chroma: f32, hue_deg: f32) -> Rgb {
     let (s, c) = hue_deg.to_radians().sin_cos();
     let (a, b) = (chroma * c, chroma * s);
@@ -32,7 +32,7 @@ pub fn map(share: f32) -> Rgb {
     oklch(0.30 + 0.61 * t, 0.115 + 0.06 * (2.0 * t - 1.0).powi(2) * t, 300.0 - 192.0 * t)
 }
 
-/// Bytes of a linear colour in the standard encoding of screens.
+/// Bytes of a linear colour in sRGB encoding.
 pub fn encode(colour: Rgb) -> [u8; 3] {
     colour.to_array().map(|v| {
         let v = v.clamp(0.0, 1.0);
@@ -61,17 +61,17 @@ pub fn thread() -> Rgb {
     oklch(0.80, 0.150, 70.0)
 }
 
-/// Colour of what a field says nothing about.
+/// Colour of bodies without a field value.
 pub fn plain() -> Rgb {
     oklch(0.86, 0.004, 250.0)
 }
 
-/// Paper.
+/// Colour of the paper.
 pub fn background() -> Rgb {
     oklch(0.985, 0.003, 90.0)
 }
 
-/// Letters.
+/// Colour of the letters.
 pub fn ink() -> Rgb {
     oklch(0.25, 0.01, 260.0)
 }

@@ -1,4 +1,4 @@
-//! Tables read back, by the names of their columns or as the rows that were written.
+//! Tables read back, by column name or as typed rows.
 
 use crate::case::parse::reason;
 use crate::error::{Error, Result};
@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A table in memory. Lines that a stopped run left half written are not part of it.
+/// A table in memory. Incomplete lines of a stopped run are left out.
 #[derive(Debug, Clone)]
 pub struct Columns {
     path: PathBuf,
@@ -16,7 +16,7 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// Reads a CSV file that [`Table`](super::table::Table) or [`Named`](super::table::Named) wrote.
+    /// Reads a CSV file written by [`Table`](super::table::Table) or [`Named`](super::table::Named).
     pub fn read(path: &Path) -> Result<Self> {
         let failed = |e: csv::Error| Error::file(path, e.to_string());
         let text = fs::read_to_string(path).map_err(|e| Error::file(path, reason(&e)))?;
@@ -45,22 +45,22 @@ impl Columns {
         self.header.iter().collect()
     }
 
-    /// The rows as a type whose fields are among the columns.
+    /// The rows as values of a type whose fields are among the columns.
     ///
     /// # Errors
-    /// A column that is missing, or a cell that is none of its field.
+    /// A column that is missing, or a cell that does not fit the type of its field.
     pub fn rows<R: DeserializeOwned>(&self) -> Result<Vec<R>> {
         let row = |row: &StringRecord| row.deserialize(Some(&self.header));
         self.rows.iter().map(row).collect::<csv::Result<_>>().map_err(|e| Error::file(&self.path, e.to_string()))
     }
 
-    /// A column as it is written; empty if there is none of this name.
+    /// A column as text; empty if no column has this name.
     pub fn texts(&self, name: &str) -> Vec<&str> {
         let at = self.header.iter().position(|h| h == name);
         at.map_or_else(Vec::new, |at| self.rows.iter().map(|row| &row[at]).collect())
     }
 
-    /// A column as numbers; what is none is NaN.
+    /// A column as numbers; cells that are not numbers are NaN.
     pub fn numbers(&self, name: &str) -> Vec<f64> {
         self.texts(name).into_iter().map(|t| t.parse().unwrap_or(f64::NAN)).collect()
     }

@@ -1,5 +1,5 @@
-//! Where results go, and what happens to results that are already there. Nothing is ever deleted but what a stopped run
-//! wrote behind the checkpoint that it is resumed from.
+//! Results folders, and the treatment of earlier results in them. Nothing is ever deleted except what a stopped run wrote after
+//! the checkpoint from which it is resumed.
 
 use super::lock::{self, Lock};
 use crate::case::parse::reason;
@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Files and folders that a run writes; pictures (`*.png`) and meshes (`*.vtu`, `*.inp`) come on top.
+/// Files and folders that a run writes; pictures (`*.png`) and meshes (`*.vtu`, `*.inp`) are additional.
 const OWN: [&str; 21] = [
     "run.log",
     "reactions.csv",
@@ -33,13 +33,13 @@ const OWN: [&str; 21] = [
 ];
 const OWN_EXTENSIONS: [&str; 3] = ["png", "vtu", "inp"];
 
-/// Where a case writes unless told otherwise: `results/<name of the case file>`.
+/// The default results folder of a case: `results/<name of the case file>`.
 pub fn default(case: &Path) -> PathBuf {
     Path::new("results").join(case.file_stem().unwrap_or("case".as_ref()))
 }
 
-/// Whether [`prepare`] would accept `dir`, as far as can be seen without changing anything: no file in the way, and empty
-/// unless `force` is given. Call it before long work.
+/// Whether [`prepare`] would accept `dir`, as far as can be checked without changing anything: no file is in the way, and the
+/// folder is empty unless `force` is given. Call it before long work.
 pub fn check(dir: &Path, force: bool) -> Result<()> {
     let in_the_way = |path| Error::file(path, "is in the way and not a folder, choose another one with -o");
     if fs::symlink_metadata(dir).is_err() {
@@ -58,17 +58,17 @@ pub fn check(dir: &Path, force: bool) -> Result<()> {
     Err(Error::file(dir, message))
 }
 
-/// Makes `dir` ready for a run. Call it once the case has been checked and its mesh built, so that bad input never
-/// touches earlier results.
+/// Prepares `dir` for a run. Call it after the case has been checked and its mesh built, so that bad input never touches
+/// earlier results.
 ///
-/// A folder that holds anything is refused unless `force` is given; then what an earlier run wrote there is moved to
-/// `dir/previous-1` (or the next free number), and everything else stays where it is. The folder is the caller's alone as long as it
-/// keeps what is returned.
+/// A folder that is not empty is refused unless `force` is given. In that case the files of an earlier run are moved to
+/// `dir/previous-1` (or the next free number), and everything else stays in place. The caller owns the folder exclusively while
+/// it holds the returned lock.
 pub fn prepare(dir: &Path, force: bool) -> Result<Lock> {
     check(dir, force)?;
     fs::create_dir_all(dir).map_err(|e| Error::file(dir, format!("cannot create the folder: {}", reason(&e))))?;
     let lock = Lock::take(dir)?;
-    // another run may have been there in between
+    // another run may have used the folder in between
     check(dir, force)?;
     let own: Vec<PathBuf> = list(dir)?.into_iter().filter(|path| is_own(path)).collect();
     if own.is_empty() {
@@ -82,7 +82,7 @@ pub fn prepare(dir: &Path, force: bool) -> Result<Lock> {
     Ok(lock)
 }
 
-/// Removes what a stopped run left behind its checkpoint: half files, and frames and pictures from number `frames` on.
+/// Removes what a stopped run left after its checkpoint: incomplete files, and frames and pictures from number `frames` on.
 pub fn tidy(dir: &Path, frames: usize) -> Result<()> {
     for folder in ["", "frames", "state"].map(|name| dir.join(name)).into_iter().filter(|folder| folder.is_dir()) {
         for path in list(&folder)?.into_iter().filter(|path| path.is_file()) {
@@ -105,7 +105,7 @@ fn list(dir: &Path) -> Result<Vec<PathBuf>> {
     paths.filter(|path| !path.as_ref().is_ok_and(|path| path.ends_with(lock::NAME))).collect()
 }
 
-/// Whether a file was being written when its run was killed.
+/// Whether a file is incomplete because its run was killed.
 fn is_half(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "part")
 }
@@ -184,7 +184,7 @@ mod tests {
         use std::os::unix::fs::PermissionsExt;
         let root = tempfile::tempdir().unwrap();
         fs::set_permissions(root.path(), fs::Permissions::from_mode(0o555)).unwrap();
-        // Permissions do not bind the superuser.
+        // Permissions do not restrict the superuser.
         if fs::write(root.path().join("probe"), "").is_err() {
             assert_eq!(prepare(root.path(), false).unwrap_err().exit_code(), 4);
         }

@@ -1,12 +1,12 @@
-//! Files that appear under their name complete, or not at all.
+//! Atomic files: they appear under their name complete, or not at all.
 
 use crate::error::{Error, Result};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Runs `fill` on a temporary file beside `path`, flushes it to the disk and renames it. If anything fails, a full disk
-/// included, the temporary file is removed and whatever was at `path` before is untouched.
+/// Runs `fill` on a temporary file next to `path`, flushes it to the disk and renames it. If anything fails, including a full
+/// disk, the temporary file is removed and the previous file at `path` is untouched.
 pub fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
     let temporary = beside(path);
     let written = File::create(&temporary).and_then(|file| {
@@ -16,13 +16,13 @@ pub fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>)
         fs::rename(&temporary, path)
     });
     written.map_err(|error| {
-        // It may never have been created; the error to report is the first one.
+        // The temporary file may not exist; the error to report is the first one.
         let _ = fs::remove_file(&temporary);
         Error::file(path, error)
     })
 }
 
-/// Waits until the names in a folder are on the disk, where folders can be flushed.
+/// Flushes the entries of a folder to the disk, where the system supports it.
 pub fn settle(folder: &Path) -> Result<()> {
     if cfg!(unix) {
         File::open(folder).and_then(|f| f.sync_all()).map_err(|e| Error::file(folder, e))?;

@@ -1,4 +1,4 @@
-//! A picture in memory, and how it becomes a PNG.
+//! A picture in memory, and its PNG output.
 
 use super::colour::{Rgb, encode};
 use super::file::replace;
@@ -21,12 +21,12 @@ impl Image {
         Self { width, height, pixels: vec![colour; width * height] }
     }
 
-    /// The pixel at a place inside.
+    /// The pixel at a position inside the image.
     pub fn pixel(&self, x: usize, y: usize) -> Rgb {
         self.pixels[y * self.width + x]
     }
 
-    /// Covers a share of a pixel with a colour; places outside are left out.
+    /// Blends a share of a colour into a pixel; positions outside are ignored.
     pub fn cover(&mut self, x: i64, y: i64, colour: Rgb, share: f32) {
         if x < 0 || y < 0 || x >= self.width as i64 || y >= self.height as i64 {
             return;
@@ -46,7 +46,7 @@ impl Image {
         }
     }
 
-    /// Pastes an image; what does not fit is left out.
+    /// Pastes an image; parts outside are clipped.
     pub fn paste(&mut self, left: usize, top: usize, other: &Image) {
         let fits = other.width.min(self.width.saturating_sub(left));
         for (y, row) in other.pixels.chunks(other.width).enumerate().take(self.height.saturating_sub(top)) {
@@ -54,12 +54,12 @@ impl Image {
         }
     }
 
-    /// Rows of pixels to write to, from the top.
+    /// Mutable rows of pixels, from the top.
     pub fn rows_mut(&mut self) -> &mut [Rgb] {
         &mut self.pixels
     }
 
-    /// Writes the image, whole or not at all.
+    /// Writes the image atomically.
     pub fn write_png(&self, path: &Path) -> Result<()> {
         let bytes: Vec<u8> = self.pixels.par_iter().flat_map_iter(|&p| encode(p)).collect();
         replace(path, |w| {

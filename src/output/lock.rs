@@ -1,4 +1,4 @@
-//! One run at a time in a folder of results.
+//! A lock that permits one run at a time in a results folder.
 
 use crate::case::parse::reason;
 use crate::error::{Error, Result};
@@ -6,10 +6,10 @@ use std::fs::{self, File, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// The file that a run holds locked while it writes into a folder.
+/// The file that a run keeps locked while it writes to a folder.
 pub const NAME: &str = ".tricot-lock";
 
-/// A folder that is ours until this is dropped, or the process ends in whatever way: the operating system frees the lock.
+/// Exclusive ownership of a folder until this is dropped or the process ends in any way: the operating system then frees the lock.
 #[derive(Debug)]
 pub struct Lock {
     path: PathBuf,
@@ -17,10 +17,10 @@ pub struct Lock {
 }
 
 impl Lock {
-    /// Takes a folder that exists.
+    /// Locks an existing folder.
     ///
     /// # Errors
-    /// Another run writes there: its process and machine. Where the file system knows no locks, nothing is refused.
+    /// Another run writes to the folder: names its process and machine. A file system without locks never refuses.
     pub fn take(dir: &Path) -> Result<Self> {
         let path = dir.join(NAME);
         let fail = |e: std::io::Error| Error::file(dir, format!("cannot write there: {}", reason(&e)));
@@ -38,7 +38,7 @@ impl Lock {
             return Err(Error::file(dir, message));
         }
         if !is_there(&file, &path) {
-            // who had it removed it after we opened it
+            // the previous owner removed the file after it was opened here
             return Self::take(dir);
         }
         file.set_len(0).map_err(fail)?;
@@ -49,12 +49,12 @@ impl Lock {
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        // while it is still locked; a file that stays behind does no harm
+        // removed while still locked; a remaining file is harmless
         let _ = fs::remove_file(&self.path).and_then(|()| self.file.unlock());
     }
 }
 
-/// Whether a path leads to an open file.
+/// Whether a path refers to an open file.
 #[cfg(unix)]
 fn is_there(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -86,7 +86,7 @@ mod tests {
         assert!(message.contains(&format!("process {} on {}", std::process::id(), host())), "{message}");
         drop(first);
         assert_eq!(fs::read_dir(root.path()).unwrap().count(), 0);
-        // what a killed run leaves is no lock
+        // the file of a killed run is not a lock
         fs::write(root.path().join(NAME), "process 1 on nowhere").unwrap();
         Lock::take(root.path()).unwrap();
     }

@@ -1,4 +1,4 @@
-//! Points with values as VTK XML poly data: maps of crossings for ParaView.
+//! Points with values as VTK XML poly data: crossing maps for ParaView.
 
 use super::file::replace;
 use super::vtu::array;
@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::mesh::frame::Field;
 use std::path::Path;
 
-/// Writes points (mm) with fields on them, whole or not at all.
+/// Writes points (mm) and their fields, atomically.
 pub fn write(points: &[[f64; 3]], fields: &[Field], path: &Path) -> Result<()> {
     if let Some(field) = fields.iter().find(|f| f.values.len() != points.len() * f.components) {
         let message = format!("field {} has {} values for {} points", field.name, field.values.len(), points.len());

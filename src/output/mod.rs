@@ -1,14 +1,14 @@
-//! What a run leaves on disk: frames for ParaView, tables and pictures. Everything is written from a [`Mesh`](crate::mesh::Mesh)
-//! and a [`Frame`](crate::mesh::frame::Frame) or from plain numbers; nothing here computes a result.
+//! Output files of a run: frames for ParaView, tables and pictures. Everything is written from a [`Mesh`](crate::mesh::Mesh)
+//! and a [`Frame`](crate::mesh::frame::Frame) or from plain numbers; nothing here computes results.
 //!
 //! - [`vtu`]: frames and their collection, [`vtu_read`] reads them back; [`map`]: points with values;
-//! - [`table`]: CSV files, each a file that is [`appended`] to; [`rows`]: the types of their rows; [`columns`] reads them back;
-//! - [`picture`] renders a frame: [`scene`] turns it into triangles, [`raster`] draws those into a depth buffer and lights
-//!   them, [`image`] holds pixels, with letters from [`text`] and colours from [`colour`];
-//! - [`page`]: a page of HTML that stands by itself, with charts from [`chart`] and [`scatter`];
-//! - [`checkpoint`]: the state of a run in one file, to go on from;
-//! - [`directory`]: where results go, one run at a time by its [`lock`];
-//! - [`mod@file`]: how a file is replaced as a whole or not at all.
+//! - [`table`]: CSV files, each an [`appended`] file; [`rows`]: the types of their rows; [`columns`] reads them back;
+//! - [`picture`] renders a frame: [`scene`] turns it into triangles, [`raster`] draws and lights them with a depth buffer,
+//! [`image`] holds pixels, with letters from [`text`] and colours from [`colour`];
+//! - [`page`]: a self-contained HTML page, with charts from [`chart`] and [`scatter`];
+//! - [`checkpoint`]: the state of a run in one file, from which it can resume;
+//! - [`directory`]: results folders, each limited to one run at a time by its [`lock`];
+//! - [`mod@file`]: atomic replacement of a file.
 
 pub mod appended;
 pub mod chart;

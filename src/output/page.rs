@@ -1,4 +1,4 @@
-//! A page of HTML that stands by itself: style, charts and pictures are inside, nothing is fetched.
+//! A self-contained HTML page: style, charts and pictures are embedded, nothing is fetched.
 
 use super::chart::escaped;
 use crate::case::parse::reason;
@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// A page being written.
+/// A page under construction.
 #[derive(Debug, Default)]
 pub struct Page {
     body: String,
@@ -20,7 +20,7 @@ impl Page {
         Self { body: format!("<h1>{}</h1>\n", escaped(title)) }
     }
 
-    /// Markup as it is.
+    /// Adds markup verbatim.
     pub fn raw(&mut self, markup: &str) {
         self.body.push_str(markup);
         self.body.push('\n');
@@ -34,7 +34,7 @@ impl Page {
         self.raw(&format!("<p class=\"{class}\">{}</p>", escaped(text)));
     }
 
-    /// Names with a value each.
+    /// Adds names with one value each.
     pub fn facts(&mut self, facts: &[(&str, String)]) {
         let fact = |(name, value): &(&str, String)| {
             format!("<div><dt>{}</dt><dd>{}</dd></div>", escaped(name), escaped(value))
@@ -47,13 +47,13 @@ impl Page {
         self.raw(&format!("<ul class=\"{class}\">{items}</ul>"));
     }
 
-    /// A chart with a title and a line below it.
+    /// Adds a chart with a title and a caption.
     pub fn figure(&mut self, title: &str, svg: &str, caption: &str) {
         let (title, caption) = (escaped(title), escaped(caption));
         self.raw(&format!("<figure><h3>{title}</h3>{svg}<figcaption>{caption}</figcaption></figure>"));
     }
 
-    /// A PNG, embedded.
+    /// Embeds a PNG.
     pub fn picture(&mut self, path: &Path, caption: &str) -> Result<()> {
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, reason(&e)))?;
         let (data, caption) = (STANDARD.encode(bytes), escaped(caption));
@@ -77,7 +77,7 @@ impl Page {
         self.raw(&format!("<div class=\"wide\"><table>\n<tr>{head}</tr>\n{body}</table></div>"));
     }
 
-    /// Text that opens on demand.
+    /// Adds text that opens on demand.
     pub fn details(&mut self, summary: &str, text: &str) {
         self.raw(&format!("<details><summary>{}</summary><pre>{}</pre></details>", escaped(summary), escaped(text)));
     }

@@ -1,6 +1,6 @@
-//! A picture of a frame: both faces of the fabric side by side, with a title, a scale bar and the meaning of the colours.
+//! A picture of a frame: both faces of the fabric side by side, with a title, a scale bar and a legend.
 //!
-//! A periodic cell is tiled: the view shows [`CELLS`] cells in each direction, cut off square. A free scene is shown whole.
+//! A periodic cell is tiled: the view shows [`CELLS`] cells in each direction, clipped to a rectangle. A free scene is shown whole.
 
 use super::chart::{label, round_step};
 use super::colour::{self, Rgb};
@@ -14,26 +14,26 @@ use crate::mesh::{Mesh, Ply};
 use glam::{DVec3, Vec2, Vec2Swizzles, Vec3, Vec3Swizzles};
 use std::ops::RangeInclusive;
 
-/// Lengths of the periodic cell that a view shows.
+/// Size of the view, in periodic cells.
 pub const CELLS: f32 = 1.5;
 
-/// Widths that can be asked for, px.
+/// Permitted widths, px.
 pub const WIDTHS: RangeInclusive<usize> = 300..=6000;
 
-/// Size of the title over that of other letters, unless it takes the room of what stands beside it.
+/// Size of the title relative to other letters, unless it would overlap its neighbours.
 const TITLE: f32 = 1.5;
 
-/// What to show.
+/// View options.
 #[derive(Debug, Clone)]
 pub struct View {
-    /// Field that gives the colours, by its name on nodes, hexahedra or beams, and its component if it is a vector (`NAME.x`);
+    /// Field that colours the bodies, by its name on nodes, hexahedra or beams, and its component if it is a vector (`NAME.x`);
     /// `None`: by ply.
     pub field: Option<String>,
-    /// Values at the ends of the colours; `None`: those of the frame.
+    /// Values at the ends of the colour scale; `None`: the range of the frame.
     pub range: Option<[f64; 2]>,
     /// Width of the picture, px.
     pub width_px: usize,
-    /// Whether an oblique view stands below the two faces.
+    /// Whether to add an oblique view below the two faces.
     pub oblique: bool,
     pub title: String,
 }
@@ -86,7 +86,7 @@ pub fn render(mesh: &Mesh, frame: &Frame, view: &View) -> Result<Image> {
     Ok(image)
 }
 
-/// Axes of the two faces (to the right, up, toward the viewer) and their captions.
+/// Axes of the two faces (right, up, toward the viewer) and their captions.
 const FACES: [([Vec3; 3], &str); 2] = [
     ([Vec3::X, Vec3::Y, Vec3::Z], "zig-zag face, from +z"),
     ([Vec3::NEG_X, Vec3::Y, Vec3::NEG_Z], "looped face, from −z (turned over)"),
@@ -100,7 +100,7 @@ fn oblique() -> [Vec3; 3] {
     [right, toward.cross(right), toward]
 }
 
-/// What is prescribed, and time.
+/// Prescribed load and time.
 fn state(mesh: &Mesh, frame: &Frame) -> String {
     let time = format!("t = {:.2} ms", 1e3 * frame.time);
     match (mesh.period, frame.displacement_mm) {
@@ -110,7 +110,7 @@ fn state(mesh: &Mesh, frame: &Frame) -> String {
     }
 }
 
-/// Extent of everything drawn in the first image, mm.
+/// Extent of all bodies in the first periodic image, mm.
 struct Bounds {
     low: Vec3,
     high: Vec3,
@@ -120,14 +120,14 @@ impl Bounds {
     fn of(scene: &Scene) -> Option<Self> {
         let mut bounds = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
         for corner in scene.quads.iter().flat_map(|q| q.corners) {
-            // corners that are not a number do not count
+            // corners that are NaN are ignored
             bounds = Self { low: corner.min(bounds.low), high: corner.max(bounds.high) };
         }
         (bounds.high - bounds.low).is_finite().then_some(bounds)
     }
 }
 
-/// The rectangle that is shown and the images that reach into it.
+/// The visible rectangle and the periodic images that reach into it.
 struct Stage {
     clip: Clip,
     middle: f32,
@@ -143,7 +143,7 @@ impl Stage {
             Some(period) => 0.5 * CELLS * Vec2::from(period.map(|l| l as f32)),
             None => (0.52 * extent.xy()).max(Vec2::splat(0.6 * extent.z)),
         };
-        // A very long or narrow piece gets paper beside it instead of a very long picture.
+        // A very long or narrow piece gets blank margins instead of a very long picture.
         let half = half.max(Vec2::new(0.4, 0.3) * half.yx());
         let clip = Clip { low: middle.xy() - half, high: middle.xy() + half };
         let reaches = |shift: &Vec3| {
@@ -162,7 +162,7 @@ impl Stage {
     }
 }
 
-/// Where things stand on the picture, px.
+/// Layout of the picture, px.
 struct Sheet {
     margin: f32,
     letters: f32,
@@ -195,7 +195,7 @@ impl Sheet {
         self.top() as f32 + self.panel[1] as f32 + 0.5 * self.letters
     }
 
-    /// Top of the last row, with the meaning of the colours.
+    /// Top of the last row, the legend.
     fn legend(&self) -> f32 {
         let wide = if self.oblique { self.wide[1] as f32 + 0.7 * self.letters } else { 0.0 };
         self.captions() + 2.0 * self.letters + wide
@@ -209,7 +209,7 @@ impl Sheet {
         text::draw(image, left, top, size * self.letters, line, colour::ink());
     }
 
-    /// One view of the scene at a place of the sheet.
+    /// Draws one view of the scene at a position on the sheet.
     fn face(
         &self,
         image: &mut Image,
@@ -225,7 +225,7 @@ impl Sheet {
         image.paste(left, top, &draw(scene, &stage.shifts, &camera, &stage.clip));
     }
 
-    /// A bar of a round length, its right end at `right`, for `scale` px per mm.
+    /// Draws a scale bar of a round length, with its right end at `right`, for `scale` px per mm.
     fn scale_bar(&self, image: &mut Image, right: f32, scale: f32) {
         let length = round_below(0.25 * self.panel[0] as f32 / scale);
         let label = format!("{length} mm");
@@ -239,7 +239,7 @@ impl Sheet {
         self.line(image, left, self.captions(), 1.0, &label);
     }
 
-    /// Names of the colours of plies and threads.
+    /// Draws the legend of plies and threads.
     fn chips(&self, image: &mut Image, mesh: &Mesh) {
         let has = |ply: Ply| mesh.blocks.iter().any(|b| b.ply == ply);
         let entries: [(bool, Rgb, &str); 4] = [
@@ -256,7 +256,7 @@ impl Sheet {
         }
     }
 
-    /// The colour map with round values of the field.
+    /// Draws the colour map with round values of the field.
     fn colour_bar(&self, image: &mut Image, name: &str, [low, high]: [f64; 2]) {
         let (size, top) = (self.letters, self.legend() + 0.1 * self.letters);
         self.line(image, self.margin, top, 1.0, name);
@@ -279,7 +279,7 @@ impl Sheet {
     }
 }
 
-/// Largest of 1, 2 and 5 times a power of ten that is not above a positive length.
+/// Largest value of 1, 2 or 5 times a power of ten that does not exceed a positive length.
 fn round_below(length: f32) -> f32 {
     let power = 10.0_f32.powf(length.log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|&v| v <= length).unwrap_or(power)
@@ -288,7 +288,7 @@ fn round_below(length: f32) -> f32 {
 /// Two to seven round values within a range.
 fn ticks(low: f64, high: f64) -> Vec<f64> {
     let step = round_step((high - low) / 6.0);
-    // an end that is a round value is one in spite of rounding
+    // an end that is round up to rounding errors counts as round
     let (first, last) = ((low / step - 1e-6).ceil() as i64, (high / step + 1e-6).floor() as i64);
     (first..=last).map(|i| i as f64 * step).collect()
 }
@@ -298,7 +298,7 @@ mod tests {
     use super::*;
     use crate::mesh::sample;
 
-    /// Share of the pixels of some columns, but for the legend, that have the warm hue of threads.
+    /// Share of pixels in some columns, without the legend, that have the warm hue of threads.
     fn warm(image: &Image, columns: std::ops::Range<usize>) -> f32 {
         let pixels = columns.clone().flat_map(|x| (0..image.height * 4 / 5).map(move |y| (x, y)));
         let count = pixels.filter(|&(x, y)| image.pixel(x, y)[0] > 1.6 * image.pixel(x, y)[2]).count();

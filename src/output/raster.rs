@@ -1,9 +1,9 @@
-//! Draws a scene: an orthographic depth buffer of several samples per pixel, then light on what is visible, once for each
-//! surface in a pixel.
+//! Draws a scene: an orthographic depth buffer with several samples per pixel, then deferred lighting, once for each surface
+//! visible in a pixel.
 //!
-//! Light is a key light from the upper left with shadows marched through the depth buffer, a sky light darkened by nearby
-//! higher surfaces, and a sheen along fibres. Where the scene is cut by the clip rectangle one looks into a yarn at its inner
-//! side; that is exactly where the cut face would be seen, so inner sides are painted as cut faces.
+//! The light consists of a key light from the upper left with shadows marched through the depth buffer, a sky light occluded by
+//! nearby higher surfaces, and a sheen along fibres. Where the clip rectangle cuts the scene, the viewer sees the inner side of
+//! a yarn exactly where the cut face would appear, so inner sides are painted as cut faces.
 
 use super::colour::{self, Rgb};
 use super::image::Image;
@@ -11,7 +11,7 @@ use super::scene::{Kind, Quad, Scene};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Where the scene is seen from.
+/// Camera of the scene.
 #[derive(Debug, Clone, Copy)]
 pub struct Camera {
     /// Unit vectors to the right, up, and toward the viewer; right-handed.
@@ -24,7 +24,7 @@ pub struct Camera {
     pub height: usize,
 }
 
-/// Part of the plane that is shown, mm.
+/// Visible part of the plane, mm.
 #[derive(Debug, Clone, Copy)]
 pub struct Clip {
     pub low: Vec2,
@@ -37,7 +37,7 @@ impl Clip {
     }
 }
 
-/// A triangle of a quad in an image.
+/// A triangle of a quad in a periodic image.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Source {
     quad: u32,
@@ -45,7 +45,7 @@ struct Source {
     second: bool,
 }
 
-/// What is seen at a sample, and its depth toward the viewer.
+/// The surface visible at a sample, and its depth toward the viewer.
 #[derive(Clone, Copy)]
 struct Fragment {
     depth: f32,
@@ -60,14 +60,14 @@ const KEY: Vec3 = Vec3::new(-0.48, 0.54, 0.69);
 /// Samples per pixel and direction.
 const FINER: usize = 2;
 
-/// Rows of samples that are drawn as one piece of work.
+/// Rows of samples that are drawn as one task.
 const BAND: usize = 64;
 
-/// How often triangles, by their boxes, may cover the picture before the large ones are left out: those of a state that came apart
-/// cover it without end.
+/// How often triangles, by their boxes, may cover the picture before the large ones are dropped: triangles of a disintegrated
+/// state would cover it without end.
 const LAYERS: f32 = 100.0;
 
-/// The scene in all its periodic images, given by their displacements in mm.
+/// Draws the scene in all its periodic images, given by their displacements in mm.
 pub fn draw(scene: &Scene, shifts: &[Vec3], camera: &Camera, clip: &Clip) -> Image {
     let fine = camera.finer();
     let triangles = triangles(scene, shifts, &fine, clip);
@@ -102,7 +102,7 @@ pub fn draw(scene: &Scene, shifts: &[Vec3], camera: &Camera, clip: &Clip) -> Ima
     image
 }
 
-/// The triangles that reach into the picture.
+/// The triangles that intersect the picture.
 fn triangles(scene: &Scene, shifts: &[Vec3], camera: &Camera, clip: &Clip) -> Vec<Triangle> {
     let of_quad = |s: usize, q: usize| {
         let corners = scene.quads[q].corners.map(|c| camera.project(c + shifts[s]));
@@ -122,7 +122,7 @@ fn triangles(scene: &Scene, shifts: &[Vec3], camera: &Camera, clip: &Clip) -> Ve
 }
 
 impl Camera {
-    /// Of the samples.
+    /// The camera of the samples.
     fn finer(&self) -> Self {
         let (width, height) = (self.width * FINER, self.height * FINER);
         Self { scale: self.scale * FINER as f32, width, height, ..*self }
@@ -135,7 +135,7 @@ impl Camera {
         Vec3::new(0.5 * self.width as f32 + self.scale * right, 0.5 * self.height as f32 - self.scale * up, toward)
     }
 
-    /// x and y in space of a pixel at a depth.
+    /// Coordinates x and y of a pixel at a depth.
     fn plane(&self, x: f32, y: f32, depth: f32) -> Vec2 {
         let right = (x - 0.5 * self.width as f32) / self.scale;
         let up = (0.5 * self.height as f32 - y) / self.scale;
@@ -149,7 +149,7 @@ fn halves(second: bool) -> [usize; 3] {
     if second { [0, 2, 3] } else { [0, 1, 2] }
 }
 
-/// A linear function of the place on the screen: its derivatives, and its value at the origin.
+/// A linear function of screen position: its derivatives, and its value at the origin.
 type Plane = [f32; 3];
 
 /// A triangle on the screen.
@@ -158,7 +158,7 @@ struct Triangle {
     /// Weights of the corners, and depth.
     weights: [Plane; 3],
     depth: Plane,
-    /// Columns and rows of samples that it can cover.
+    /// Columns and rows of samples that it may cover.
     columns: [usize; 2],
     rows: [usize; 2],
     /// Whether the clip rectangle cuts it.
@@ -166,7 +166,7 @@ struct Triangle {
 }
 
 impl Triangle {
-    /// `None` where it has no area or is out of sight.
+    /// `None` if it has no area or is out of view.
     fn new(camera: &Camera, clip: &Clip, corners: [Vec3; 3], source: Source) -> Option<Self> {
         let reach = |k: usize, size: usize| {
             let (low, high) = corners.iter().fold((f32::MAX, f32::MIN), |(l, h), c| (l.min(c[k]), h.max(c[k])));
@@ -179,7 +179,7 @@ impl Triangle {
         Some(Self { source, weights, depth, columns, rows, cut })
     }
 
-    /// Samples that are tried.
+    /// Number of samples tested.
     fn samples(&self) -> f32 {
         let ([left, right], [up, down]) = (self.columns, self.rows);
         (right - left) as f32 * (down - up) as f32
@@ -192,7 +192,7 @@ impl Triangle {
             let row = &mut rows[(y - top) * camera.width..][..camera.width];
             let py = y as f32 + 0.5;
             let along = |[dx, dy, at]: Plane| [dx, dy * py + at];
-            // the samples that an edge leaves, in their middles: dx · x + at ≥ 0
+            // the samples within the edges, at their centres: dx · x + at ≥ 0
             let (mut left, mut right) = (self.columns[0] as f32, self.columns[1] as f32);
             for [dx, at] in self.weights.map(along) {
                 let border = -at / dx - 0.5;
@@ -216,7 +216,7 @@ impl Triangle {
     }
 }
 
-/// Weights of the corners of a screen triangle; `None` where it has no area.
+/// Weights of the corners of a screen triangle; `None` if it has no area.
 fn weights(corners: [Vec3; 3]) -> Option<[Plane; 3]> {
     let [a, b, c] = corners.map(Vec3::truncate);
     let whole = (b - a).perp_dot(c - a);
@@ -234,7 +234,7 @@ struct Surface {
     colour: Rgb,
     grain: Vec3,
     kind: Kind,
-    /// Seen from inside: part of a cut face.
+    /// Whether it is seen from inside, as part of a cut face.
     cut: bool,
 }
 
@@ -262,7 +262,7 @@ impl Surface {
         }
     }
 
-    /// Colour under the lights: `sky` and `sun` are the shares of them that arrive; `calm` subdues patterns.
+    /// Lit colour: `sky` and `sun` are the visible shares of the lights; `calm` subdues patterns.
     fn lit(&self, camera: &Camera, [sky, sun]: [f32; 2], calm: bool) -> Rgb {
         let [right, up, toward] = camera.axes;
         let key = (right * KEY.x + up * KEY.y + toward * KEY.z).normalize_or_zero();
@@ -273,7 +273,7 @@ impl Surface {
             Kind::Yarn => (filaments(self.grain), 0.16, 24, relief(self.normal, toward)),
             Kind::Thread => (twist(self.grain), 0.10, 12, self.normal),
         };
-        // Where colours are values, the pattern of the filaments stays in the background.
+        // Where colours show values, the filament pattern stays in the background.
         let (texture, gloss) = if calm { (1.0 + 0.3 * (texture - 1.0), 0.2 * gloss) } else { (texture, gloss) };
         let half = (key + toward).normalize_or_zero();
         let along = self.fibre.dot(half);
@@ -291,8 +291,8 @@ fn relief(normal: Vec3, toward: Vec3) -> Vec3 {
     (normal * TILT + toward * ((1.0 - TILT) * normal.dot(toward))).normalize_or_zero()
 }
 
-/// Brightness of the filaments of a tow: fine streaks along the fibre, at several widths. It repeats with the length, so
-/// that no seam shows where a yarn closes on itself.
+/// Brightness of the filaments of a tow: fine streaks along the fibre, at several widths. The pattern repeats with the length,
+/// so that a closed yarn shows no seam.
 fn filaments(grain: Vec3) -> f32 {
     let [across, along, length] = grain.to_array();
     let streaks = |per_mm: f32, long: f32| {
@@ -302,7 +302,7 @@ fn filaments(grain: Vec3) -> f32 {
     1.0 + 0.30 * streaks(9.0, 5.0) + 0.24 * streaks(23.0, 2.5) + 0.16 * streaks(3.0, 5.0)
 }
 
-/// Brightness of a twisted thread: two plies winding around it.
+/// Brightness of a twisted thread: two plies wound around each other.
 fn twist(grain: Vec3) -> f32 {
     let [around, along, turns] = grain.to_array();
     0.92 + 0.13 * (std::f32::consts::TAU * (2.0 * around + along * turns)).sin()
@@ -318,14 +318,14 @@ fn noise(x: f32, y: f32, cells: i32) -> f32 {
     row(j) + v * (row(j + 1) - row(j))
 }
 
-/// The greatest whole number below, and what is left.
+/// Floor and fractional part.
 fn whole(value: f32) -> (i32, f32) {
     let cut = value as i32;
     let below = if (cut as f32) > value { cut - 1 } else { cut };
     (below, value - below as f32)
 }
 
-/// Bits without pattern for a pair of numbers.
+/// Hash of a pair of numbers, without visible pattern.
 fn chance(i: i32, j: i32) -> u32 {
     let mut h = (i as u32).wrapping_mul(0x9e37_79b1) ^ (j as u32).wrapping_mul(0x85eb_ca77);
     h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
@@ -333,25 +333,25 @@ fn chance(i: i32, j: i32) -> u32 {
     h ^ (h >> 15)
 }
 
-/// How high the surface stands toward the viewer at every pixel, mm, and where light is looked for around it.
+/// Height of the surface toward the viewer at every pixel, mm, and the sampling offsets for light around it.
 struct Heights {
     /// With a margin on every side; `NEG_INFINITY` where there is no surface.
     values: Vec<f32>,
     width: usize,
     margin: usize,
-    /// For each way that a pixel can be turned: in every direction, how far away, mm, and how far in `values`.
+    /// For each rotation of the pattern: distance, mm, and offset in `values`, in every direction.
     around: [[[(f32, isize); RINGS.len()]; DIRECTIONS]; TURNS],
-    /// For each way: along the ray to the key light, by how much it rises, mm, and how far in `values`.
+    /// For each rotation: rise, mm, and offset in `values`, along the ray to the key light.
     towards: [[(f32, isize); STEPS]; TURNS],
 }
 
-/// Where a pixel looks for the sky: in so many directions, so far away, mm.
+/// Sky sampling: number of directions, and distances, mm.
 const DIRECTIONS: usize = 8;
 const RINGS: [f32; 3] = [0.07, 0.18, 0.42];
-/// Where it looks for the key light: at so many places, up to so far away, mm.
+/// Key light sampling: number of positions, and largest distance, mm.
 const STEPS: usize = 14;
 const LENGTH: f32 = 0.9;
-/// Ways to turn and shift these places from pixel to pixel, so that they do not show.
+/// Number of rotations and shifts of the sampling pattern between pixels, which hide the pattern.
 const TURNS: usize = 16;
 
 impl Heights {
@@ -384,8 +384,8 @@ impl Heights {
         Self { values, width, margin, around, towards }
     }
 
-    /// Shares of the sky that is seen from a height at a pixel, less where surfaces nearby are higher, and of the key light that
-    /// reaches it.
+    /// Visible share of the sky from a height at a pixel, reduced where nearby surfaces are higher, and share of the key light
+    /// that reaches it.
     fn light(&self, x: usize, y: usize, own: f32) -> [f32; 2] {
         let here = (y + self.margin) * self.width + x + self.margin;
         let height = |away: isize| self.values[here.wrapping_add_signed(away)];

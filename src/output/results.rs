@@ -1,4 +1,4 @@
-//! The files of a run on disk, and charts of their columns.
+//! The output files of a run, and charts of their columns.
 
 use super::chart::{self, Curve};
 use super::columns::Columns;
@@ -7,20 +7,20 @@ use crate::error::Result;
 use serde_json::Value;
 use std::path::Path;
 
-/// The files of a run.
+/// The output files of a run.
 pub struct Results<'a> {
     pub dir: &'a Path,
     pub history: Columns,
-    /// Null while the run goes on.
+    /// Null for an unfinished run.
     pub summary: Value,
     pub case: Value,
 }
 
-/// What curves are drawn over.
+/// The abscissa of curves.
 #[derive(Debug, Clone, Copy)]
 pub struct Axis {
     pub label: &'static str,
-    /// Column, factor, and the name of the load steps that count; all where it is `None`.
+    /// Column, factor, and the name of the load steps that count; `None` for all load steps.
     pub column: &'static str,
     pub factor: f64,
     pub phase: Option<&'static str>,
@@ -45,13 +45,13 @@ impl Results<'_> {
         self.summary[name].as_f64().unwrap_or(f64::NAN)
     }
 
-    /// Another table of the run, if it has one.
+    /// Another table of the run, if it exists.
     pub fn other(&self, name: &str) -> Result<Option<Columns>> {
         let path = self.dir.join(name);
         path.is_file().then(|| Columns::read(&path)).transpose()
     }
 
-    /// What its curves are drawn over: the shear angle or the displacement where there is a load step for it, else time.
+    /// The abscissa: shear angle or displacement if a load step prescribes it, else time.
     pub fn axis(&self) -> Axis {
         let phases = self.history.texts("phase");
         [OVER_ANGLE, OVER_DISPLACEMENT]
@@ -60,7 +60,7 @@ impl Results<'_> {
             .unwrap_or(OVER_TIME)
     }
 
-    /// Points of a column of a table with a row for each row of the history.
+    /// Points of a column, for a table with one row per history row.
     pub fn points(&self, table: &Columns, axis: &Axis, column: &str) -> Vec<[f64; 2]> {
         let phases = self.history.texts("phase");
         let xs = self.history.numbers(axis.column);
@@ -69,7 +69,7 @@ impl Results<'_> {
         rows.map(|((x, y), _)| [x * axis.factor, y]).collect()
     }
 
-    /// A chart of columns of a table with a row for each row of the history: title and unit, columns with their names.
+    /// A chart of columns, for a table with one row per history row: title and unit, columns with their names.
     pub fn chart(
         &self,
         page: &mut Page,
@@ -95,13 +95,13 @@ impl Results<'_> {
     }
 }
 
-/// Column of the standard deviation that belongs to that of a mean: `warp_gap_std_mm` to `warp_gap_mm`.
+/// Column of the standard deviation that belongs to a column of means: `warp_gap_std_mm` to `warp_gap_mm`.
 fn spread_of(column: &str) -> Option<String> {
     let (name, unit) = column.rsplit_once('_')?;
     Some(format!("{}_std_{unit}", name.strip_suffix("_mean").unwrap_or(name)))
 }
 
-/// A number of a table with five digits.
+/// A table cell rounded to five digits.
 pub fn short(cell: &str) -> String {
     match cell.parse::<f64>() {
         Ok(0.0) => "0".into(),

@@ -1,23 +1,23 @@
-//! Points over two logarithmic axes as an SVG that stands by itself: numbered marks with a key, a front, and levels.
+//! Points over two logarithmic axes as a self-contained SVG: numbered marks with a key, a Pareto front, and levels.
 
 use super::chart::escaped;
 use std::fmt::Write as _;
 
-/// A point with what the key says of it.
+/// A point with its entry in the key.
 #[derive(Debug, Clone)]
 pub struct Mark<'a> {
     pub number: usize,
     pub name: &'a str,
-    /// Marks of a group look alike; `None` for one of its own.
+    /// Marks of a group look alike; `None` for a point without a group.
     pub group: Option<usize>,
     pub at: [f64; 2],
-    /// Drawn full, or as an outline.
+    /// Filled mark, or outline.
     pub filled: bool,
-    /// Drawn larger.
+    /// Larger mark.
     pub strong: bool,
 }
 
-/// A chart of points; only what is above zero on both axes is drawn.
+/// A scatter chart; only points above zero on both axes are drawn.
 #[derive(Debug, Clone)]
 pub struct Scatter<'a> {
     pub axes: [&'a str; 2],
@@ -29,21 +29,21 @@ pub struct Scatter<'a> {
 }
 
 const WIDTH: f64 = 900.0;
-/// Left, top and right of the area of the points, and where the key begins.
+/// Left, top and right of the plot area, and the start of the key.
 const AREA: [f64; 3] = [64.0, 16.0, 690.0];
 const KEY: f64 = 712.0;
 /// Height of a line of the key, and of everything below the area.
 const LINE: f64 = 15.0;
 const BELOW: f64 = 48.0;
 const COLOURS: [&str; 8] = ["#1b5e8c", "#c2571a", "#3f7d3a", "#7a4b94", "#a8324a", "#0f7f7a", "#8a6d1f", "#555b63"];
-/// A level below the lowest point by more than this factor is only named.
+/// A level below the lowest point by more than this factor is only listed.
 const FAR: f64 = 10.0;
 const INK: &str = "#23262b";
-/// Size of a digit of a number beside its mark, and distances at which it is tried.
+/// Size of a digit next to its mark, and the distances at which it is tried.
 const DIGIT: [f64; 2] = [6.4, 10.0];
 const DISTANCES: [f64; 6] = [10.0, 15.0, 21.0, 28.0, 37.0, 48.0];
 
-/// Middle and half sizes of something drawn.
+/// Centre and half sizes of a drawn item.
 type Box = [[f64; 2]; 2];
 
 impl Scatter<'_> {
@@ -53,7 +53,7 @@ impl Scatter<'_> {
         let marks: Vec<&Mark> = self.marks.iter().filter(|m| positive(&m.at)).collect();
         marks.first()?;
         let lines: Vec<&(f64, String)> = self.lines.iter().filter(|l| l.0.is_finite() && l.0 > 0.0).collect();
-        // a level far below all points would squeeze them
+        // a level far below all points would compress the plot
         let lowest = marks.iter().map(|m| m.at[1]).fold(f64::MAX, f64::min);
         let (lines, far): (Vec<_>, Vec<_>) = lines.into_iter().partition(|l| l.0 > lowest / FAR);
         let levels = lines.iter().map(|l| l.0);
@@ -138,7 +138,7 @@ impl Mark<'_> {
         if self.strong { 6.0 } else { 4.0 }
     }
 
-    /// Groups differ in colour, and after some of them in shape.
+    /// Groups differ in colour and, when the colours are used up, in shape.
     fn draw(&self, t: &mut String, [x, y]: [f64; 2]) {
         let (colour, square) =
             self.group.map_or((INK, false), |g| (COLOURS[g % COLOURS.len()], g / COLOURS.len() % 2 == 1));
@@ -162,7 +162,7 @@ fn text(t: &mut String, [x, y]: [f64; 2], anchor: &str, size: u32, content: &str
     let _ = writeln!(t, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" style=\"{font}\">{content}</text>");
 }
 
-/// A place for a label near a mark where nothing else is; right of the mark if there is none.
+/// A free position for a label near a mark; right of the mark if there is none.
 fn free([x, y]: [f64; 2], size: [f64; 2], taken: &[Box], [left, top, right, bottom]: [f64; 4]) -> [f64; 2] {
     let places = DISTANCES.iter().flat_map(|r| (0..12).map(move |k| (*r, f64::from(k) * std::f64::consts::FRAC_PI_6)));
     let mut places = places.map(|(r, turn)| [x + r * libm::cos(turn), y - r * libm::sin(turn)]);
@@ -180,7 +180,7 @@ struct Ticks {
     range: [f64; 2],
 }
 
-/// Ticks at 1, 2 and 5 of each decade that has values, or closer ones where these are too few.
+/// Ticks at 1, 2 and 5 of each decade that has values, or closer ones if these are too few.
 fn ticks(values: impl Iterator<Item = f64>) -> Ticks {
     let (low, high) = values.fold((f64::MAX, f64::MIN_POSITIVE), |(l, h), v| (l.min(v), h.max(v)));
     let range = [low / 1.25, high * 1.25];

@@ -1,4 +1,4 @@
-//! Surfaces to draw: yarns as their outer faces, threads as tubes, each corner with a normal and a colour.
+//! Surfaces to draw: yarns as outer faces, threads as tubes, each corner with a normal and a colour.
 //!
 //! Tubes follow a smooth curve through the beams' nodes (Catmull–Rom), so that a loop of few beams looks round; colours of
 //! beams stay constant along each beam.
@@ -9,22 +9,22 @@ use crate::mesh::frame::{Field, Frame};
 use crate::mesh::{Block, Mesh, Ply, Seen, Thread};
 use glam::{DVec3, Vec3};
 
-/// Sides of a tube, and pieces per beam.
+/// Number of sides of a tube, and of pieces per beam.
 const SIDES: usize = 14;
 const PIECES: usize = 4;
 
 /// Height of one turn of a thread's twist, mm.
 const TWIST: f32 = 0.45;
 
-/// Everything that is drawn once per periodic image.
+/// All surfaces of one periodic image.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
     pub quads: Vec<Quad>,
-    /// Name and range of the field that gives the colours.
+    /// Name and range of the colouring field.
     pub legend: Option<(String, [f64; 2])>,
 }
 
-/// A piece of surface. Corners go around; the edge from corner 0 to corner 1 follows the fibre.
+/// A surface quad. Corners are in cyclic order; the edge from corner 0 to corner 1 follows the fibre.
 #[derive(Debug, Clone, Copy)]
 pub struct Quad {
     /// mm.
@@ -38,7 +38,7 @@ pub struct Quad {
     pub kind: Kind,
 }
 
-/// What a surface is made of.
+/// The body that a surface belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     Yarn,
@@ -50,12 +50,12 @@ struct Paint<'a> {
     node: Option<&'a Field>,
     hex: Option<&'a Field>,
     beam: Option<&'a Field>,
-    /// Of a vector; `None` for its length.
+    /// Vector component; `None` for the length.
     component: Option<usize>,
     range: [f64; 2],
 }
 
-/// Components of a vector by name; behind them, its length.
+/// Components of a vector by name, followed by its length.
 const COMPONENTS: [&str; 4] = ["x", "y", "z", "length"];
 
 impl Paint<'_> {
@@ -129,7 +129,7 @@ fn paint<'a>(frame: &'a Frame, name: &str) -> Result<Paint<'a>> {
     Ok(paint)
 }
 
-/// Outer faces of a block; `(first, index)` are the number of its first hexahedron and its own.
+/// Outer faces of a block; `(first, index)` are the number of its first hexahedron and its own index.
 fn surfaces(
     quads: &mut Vec<Quad>,
     mesh: &Mesh,
@@ -139,7 +139,7 @@ fn surfaces(
     paint: Option<&Paint>,
 ) {
     let (slices, columns, layers) = (block.slices, block.columns, block.layers);
-    // A face is a grid: (i, j) on it to (slice, column, layer); `flip` where i × j points inward.
+    // A face is a grid: maps (i, j) to (slice, column, layer); `flip` where i × j points inward.
     type Corner = fn(usize, usize, usize) -> [usize; 3];
     let mut faces: Vec<(usize, usize, usize, bool, Corner)> = vec![
         (slices, columns, 0, true, |i, j, at| [i, j, at]),
@@ -159,7 +159,7 @@ fn surfaces(
     };
     for (face, &(rows, across, at, flip, corner)) in faces.iter().enumerate() {
         let point = |i: usize, j: usize| position(corner(i, j, at));
-        // Normals from neighbours on the grid; a closed yarn continues beyond its ends.
+        // Normals from grid neighbours; a closed yarn continues beyond its ends.
         let closed = block.wrap.is_some();
         let along = |i: usize, j: usize| match (closed, i == 0 || i == rows) {
             (true, true) => point(1, j) - point(0, j) + (point(rows, j) - point(rows - 1, j)),
@@ -202,7 +202,7 @@ fn surfaces(
     }
 }
 
-/// A round tube along a thread whose first beam has the number `first`.
+/// A round tube along a thread; `first` is the number of its first beam.
 fn tube(quads: &mut Vec<Quad>, mesh: &Mesh, frame: &Frame, thread: &Thread, first: usize, paint: Option<&Paint>) {
     let beams = thread.beams();
     if beams == 0 {
@@ -219,7 +219,7 @@ fn tube(quads: &mut Vec<Quad>, mesh: &Mesh, frame: &Frame, thread: &Thread, firs
         i if i <= beams + 1 => points[i - 1],
         _ => after,
     };
-    // Points and directions of the smooth curve, PIECES a beam.
+    // Points and directions of the smooth curve, PIECES per beam.
     let curve: Vec<(Vec3, Vec3)> = (0..=beams * PIECES)
         .map(|k| {
             let beam = (k / PIECES).min(beams - 1);
@@ -231,7 +231,7 @@ fn tube(quads: &mut Vec<Quad>, mesh: &Mesh, frame: &Frame, thread: &Thread, firs
     let mut run = 0.0;
     let mut rings: Vec<([Vec3; SIDES], f32)> = Vec::with_capacity(curve.len());
     for (k, &(point, direction)) in curve.iter().enumerate() {
-        // Carried along without twisting.
+        // Parallel transport, without twist.
         side = (side - direction * side.dot(direction)).normalize_or_zero();
         let up = direction.cross(side);
         run += if k == 0 { 0.0 } else { point.distance(curve[k - 1].0) };
@@ -277,12 +277,12 @@ fn catmull_rom([before, from, to, after]: [Vec3; 4], t: f32) -> (Vec3, Vec3) {
     (from + t * (slope + t * (square + t * cube)), direction.normalize_or_zero())
 }
 
-/// A vector across `v`, not of unit length.
+/// A vector perpendicular to `v`, not normalised.
 fn perpendicular(v: Vec3) -> Vec3 {
     v.cross(if v.z.abs() < 0.7 { Vec3::Z } else { Vec3::X })
 }
 
-/// Where a node is seen, mm.
+/// Position of a node in its image, mm.
 fn place(mesh: &Mesh, frame: &Frame, seen: Seen) -> Vec3 {
     DVec3::from(frame.position(mesh, seen)).as_vec3()
 }

@@ -1,7 +1,7 @@
-//! CSV tables, readable while the run goes on: every row is on disk once it is written.
+//! CSV tables, readable during a run: every row is on disk once it is written.
 //!
-//! Numbers are written with the fewest digits that read back to the same f64; not-a-number as `NaN`. Names that hold a comma or a
-//! quote stand in quotes.
+//! Numbers are written with the fewest digits that read back to the same f64; NaN is written as `NaN`. Names that contain a
+//! comma or a quote are quoted.
 
 use super::appended::Appended;
 use crate::error::{Error, Result};
@@ -11,7 +11,7 @@ use std::io;
 use std::marker::PhantomData;
 use std::path::Path;
 
-/// A table whose columns are the fields of `R`, or those of several types, one behind the other, where `R` is a tuple of them.
+/// A table whose columns are the fields of `R`; if `R` is a tuple, the fields of its types in sequence.
 #[derive(Debug)]
 pub struct Table<R> {
     pub file: Appended,
@@ -19,17 +19,17 @@ pub struct Table<R> {
 }
 
 impl<R: Serialize + Default> Table<R> {
-    /// Starts a table with its header, replacing any old one.
+    /// Creates a table with its header, replacing any old one.
     pub fn create(path: &Path) -> Result<Self> {
         let mut file = Appended::create(path)?;
         let header = line(true, |w| w.serialize(R::default())).map_err(|e| Error::file(path, e))?;
-        // the header is written with the first row, of which only its names count here
+        // the header comes from serialising a first row, of which only the names are used
         let end = header.iter().position(|byte| *byte == b'\n').map_or(header.len(), |at| at + 1);
         file.push(&header[..end])?;
         Ok(Self { file, rows: PhantomData })
     }
 
-    /// Opens a table that a run left, to go on behind its last row.
+    /// Opens the table of an earlier run, to append after its last row.
     pub fn open(path: &Path) -> Result<Self> {
         Ok(Self { file: Appended::open(path)?, rows: PhantomData })
     }
@@ -40,7 +40,7 @@ impl<R: Serialize + Default> Table<R> {
     }
 }
 
-/// A table whose columns are named when it is made, since they depend on the scene.
+/// A table whose column names are given at creation, since they depend on the scene.
 #[derive(Debug)]
 pub struct Named {
     pub file: Appended,
@@ -48,19 +48,19 @@ pub struct Named {
 }
 
 impl Named {
-    /// Starts a table with its header, replacing any old one.
+    /// Creates a table with its header, replacing any old one.
     pub fn create(path: &Path, names: &[String]) -> Result<Self> {
         let mut table = Self { file: Appended::create(path)?, columns: names.len() };
         table.row(names)?;
         Ok(table)
     }
 
-    /// Opens a table that a run left, to go on behind its last row.
+    /// Opens the table of an earlier run, to append after its last row.
     pub fn open(path: &Path, columns: usize) -> Result<Self> {
         Ok(Self { file: Appended::open(path)?, columns })
     }
 
-    /// Writes a row: one cell a column.
+    /// Writes a row: one cell per column.
     pub fn row(&mut self, cells: &[String]) -> Result<()> {
         if cells.len() != self.columns {
             let message = format!("{} cells for {} columns", cells.len(), self.columns);
@@ -76,16 +76,16 @@ impl Named {
     }
 }
 
-/// The bytes of what is written, with the header of its type if that is wanted.
+/// The bytes of a written record, with the header of its type if requested.
 fn line(header: bool, write: impl FnOnce(&mut Writer<Vec<u8>>) -> csv::Result<()>) -> io::Result<Vec<u8>> {
     let mut writer = WriterBuilder::new().has_headers(header).from_writer(Vec::new());
     write(&mut writer)?;
     writer.into_inner().map_err(csv::IntoInnerError::into_error)
 }
 
-/// A number as tables hold it.
+/// A number as table text.
 pub fn text(value: f64) -> String {
-    // `Debug` is the shortest text that reads back, with an exponent where that is shorter
+    // `Debug` gives the shortest text that reads back, with an exponent where that is shorter
     let mut text = format!("{value:?}");
     if text.ends_with(".0") {
         text.truncate(text.len() - 2);

@@ -10,7 +10,7 @@ const GLYPHS: &str = concat!(
     "°µ·²³±−×γεσθ–"
 );
 
-/// Width of every glyph, px at the size of the strip; each has a margin of [`MARGIN`] on both sides there.
+/// Width of every glyph, px at the size of the strip; in the strip each glyph has a margin of [`MARGIN`] on both sides.
 const WIDTHS: [u8; 108] = [
     11, 13, 15, 27, 21, 31, 25, 9, 13, 13, 16, 27, 11, 12, 11, 11, 21, 21, 21, 21, 21, 21, 21, 21, 21, 21, 11, 11, 27,
     27, 27, 17, 32, 22, 22, 23, 25, 21, 19, 25, 25, 10, 10, 21, 18, 28, 24, 26, 20, 26, 23, 21, 20, 24, 22, 32, 22, 20,
@@ -36,7 +36,7 @@ static STRIP: LazyLock<(Vec<u8>, usize)> = LazyLock::new(|| {
     (bytes, width)
 });
 
-/// Place and width of a glyph in the strip; unknown characters show as `?`.
+/// Position and width of a glyph in the strip; unknown characters show as `?`.
 fn glyph(letter: char) -> (usize, usize) {
     let index = GLYPHS.chars().position(|g| g == letter).unwrap_or(31);
     let left = WIDTHS[..index].iter().map(|&w| usize::from(w) + 2 * MARGIN).sum::<usize>();
@@ -48,7 +48,7 @@ pub fn width(text: &str, size: f32) -> f32 {
     text.chars().map(|c| glyph(c).1 as f32).sum::<f32>() * size / SIZE
 }
 
-/// Draws a line whose box has this left end and top, px.
+/// Draws a line of text whose box has this left end and top, px.
 pub fn draw(image: &mut Image, left: f32, top: f32, size: f32, text: &str, colour: Rgb) {
     let scale = SIZE / size;
     let mut pen = left;
@@ -68,7 +68,7 @@ pub fn draw(image: &mut Image, left: f32, top: f32, size: f32, text: &str, colou
     }
 }
 
-/// Mean coverage of a square of the strip with this corner and side, inside a glyph's cells.
+/// Mean coverage of a square of the strip with this corner and side, within the cells of one glyph.
 fn coverage([start, cells]: [usize; 2], x: f32, y: f32, side: f32) -> f32 {
     const TAPS: usize = 4;
     let (strip, width) = &*STRIP;

@@ -4,12 +4,12 @@
 //! (type 3), threads in order. Points are the nodes in order, followed by copies for the slices and beams that close a
 //! yarn or thread through the periodic cell: a copy stands at its image position, so that every cell is valid.
 //!
-//! Written besides the fields of the frame, whose fields of the same name they replace:
-//! points `displacement_mm` (current less reference position, for a copy in its image) and `thread_radius_mm` (0 on yarns);
+//! Added to the fields of the frame, replacing fields of the same name:
+//! points `displacement_mm` (current minus reference position, for a copy in its image) and `thread_radius_mm` (0 on yarns);
 //! cells `body` (blocks, then threads, counted from 0), `ply` (0 warp, 1 weft, 2 free, 3 thread), `part` (0 loop,
 //! 1 underlap, 2 free thread, −1 yarn), `thread` (−1 for yarns), `radius_mm` (0 for yarns) and `fibre` (unit vector, deformed:
 //! the fibre direction of a yarn, the axis of a beam).
-//! A field of hexahedra and one of beams with the same name and size become one array. Where a field has no value, it is NaN.
+//! Hexahedron and beam fields with the same name and size become one array. Missing field values are NaN.
 //!
 //! Field data hold `TimeValue` (s), `shear_angle_deg`, `prescribed_displacement_mm` (the largest of a free scene) and
 //! `macroscopic_gradient` (F̄, the in-plane part, rows first).
@@ -28,17 +28,17 @@ use std::collections::HashMap;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Bytes that are compressed at a time; readers decompress block by block.
+/// Bytes compressed at a time; readers decompress block by block.
 const BLOCK: usize = 1 << 18;
 
-/// Writes a frame, whole or not at all.
+/// Writes a frame atomically.
 pub fn write(mesh: &Mesh, frame: &Frame, path: &Path) -> Result<()> {
     frame.check(mesh)?;
     let grid = Grid::of(mesh, frame);
     replace(path, |w| grid.write(w, frame))
 }
 
-/// Writes a collection (`.pvd`): times in s and files relative to it.
+/// Writes a collection (`.pvd`): times in s, and file paths relative to the collection.
 pub fn write_collection(path: &Path, frames: &[(f64, String)]) -> Result<()> {
     replace(path, |w| {
         writeln!(w, "<?xml version=\"1.0\"?>")?;
@@ -60,7 +60,7 @@ struct Grid {
     cell_data: Vec<Array>,
 }
 
-/// A named array with its values as they are stored.
+/// A named array with its stored values.
 struct Array {
     name: String,
     components: usize,
@@ -176,14 +176,14 @@ fn hexes(block: &Block) -> impl Iterator<Item = [Seen; 8]> + '_ {
     lines.flat_map(move |(column, layer)| (0..block.slices).map(move |slice| block.corners(slice, column, layer)))
 }
 
-/// Adds an array unless one of that name is there.
+/// Adds an array unless an array of that name exists.
 fn add(arrays: &mut Vec<Array>, array: Array) {
     if arrays.iter().all(|a| a.name != array.name) {
         arrays.push(array);
     }
 }
 
-/// The cell arrays every file has.
+/// The cell arrays of every file.
 fn bodies(mesh: &Mesh, frame: &Frame) -> Vec<Array> {
     let (mut body, mut ply, mut part, mut thread_of) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let (mut radius, mut fibre) = (Vec::new(), Vec::new());
@@ -227,7 +227,7 @@ fn bodies(mesh: &Mesh, frame: &Frame) -> Vec<Array> {
     ]
 }
 
-/// Cell fields of the frame, those of hexahedra followed by those of beams.
+/// Cell fields of the frame: values of hexahedra followed by values of beams.
 fn joined(mesh: &Mesh, frame: &Frame) -> Vec<Field> {
     let none = |items: usize, field: &Field| vec![f64::NAN; items * field.components];
     let matches = |a: &Field, b: &Field| a.name == b.name && a.components == b.components;
@@ -242,11 +242,11 @@ fn joined(mesh: &Mesh, frame: &Frame) -> Vec<Field> {
     of_hexes.chain(of_beams).collect()
 }
 
-/// A reference direction carried along by the deformation at the centre of a hexahedron, unit length.
+/// A reference direction convected by the deformation at the centre of a hexahedron, normalised.
 fn carried(mesh: &Mesh, frame: &Frame, corners: &[Seen; 8], direction: DVec3) -> DVec3 {
     let before = axes(corners.map(|seen| mesh.position(seen)));
     let after = axes(corners.map(|seen| frame.position(mesh, seen)));
-    // shares of the direction in the reference axes, by Cramer's rule
+    // components of the direction in the reference axes, by Cramer's rule
     let det = |a: DVec3, b: DVec3, c: DVec3| a.dot(b.cross(c));
     let DMat3 { x_axis: a, y_axis: b, z_axis: c } = before;
     let shares = DVec3::new(det(direction, b, c), det(a, direction, c), det(a, b, direction)) / det(a, b, c);
@@ -262,12 +262,12 @@ fn axes(corners: [[f64; 3]; 8]) -> DMat3 {
     DMat3::from_cols(xi, eta, zeta)
 }
 
-/// Not a number where a vector has no length.
+/// The normalised vector; NaN for a zero vector.
 fn unit(v: DVec3) -> DVec3 {
     v / v.length()
 }
 
-/// One inline array: a header of the sizes of its blocks, then the blocks, each part in base64.
+/// One inline array: a header with the sizes of its blocks, then the blocks, both in base64.
 pub(super) fn array<T: bytemuck::NoUninit>(
     w: &mut dyn Write,
     kind: &str,
@@ -278,7 +278,7 @@ pub(super) fn array<T: bytemuck::NoUninit>(
     // Little endian is stated in the file and true of every machine this is built for.
     const { assert!(cfg!(target_endian = "little")) };
     let name = escaped(name);
-    // readers make a table of one column of what says that it has one component
+    // readers make a one-column table of an array that declares one component
     let count = if components == 1 { String::new() } else { format!(" NumberOfComponents=\"{components}\"") };
     write!(w, "<DataArray type=\"{kind}\" Name=\"{name}\"{count} format=\"binary\">")?;
     let bytes: &[u8] = bytemuck::cast_slice(values);

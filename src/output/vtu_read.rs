@@ -1,7 +1,7 @@
 //! Frames read back from the files that [`vtu`](super::vtu) writes.
 //!
-//! Nodes, hexahedra and beams stand in the order of the mesh there, so its first points are its nodes and its cells are its
-//! elements. Arrays of cells become fields of hexahedra and of beams, without the part that holds no value.
+//! Nodes, hexahedra and beams are in mesh order in the file, so its first points are the nodes and its cells are the elements.
+//! Cell arrays become fields of hexahedra and of beams, without the part that holds no value.
 
 use crate::case::parse::reason;
 use crate::error::{Error, Result};
@@ -14,10 +14,10 @@ use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Reads a frame of a mesh.
+/// Reads a frame of the given mesh.
 ///
 /// # Errors
-/// A file that is not a whole frame written by `tricot`, or one of another mesh.
+/// A file that is not a complete frame written by `tricot`, or a frame of another mesh.
 pub fn read(path: &Path, mesh: &Mesh) -> Result<Frame> {
     let text = text(path)?;
     let broken = |what: &str| {
@@ -91,7 +91,7 @@ fn part(field: &Field, first: usize, count: usize) -> Field {
     Field { values: field.values[first * n..(first + count) * n].to_vec(), ..field.clone() }
 }
 
-/// An array as it stands in the file.
+/// An array as stored in the file.
 struct Array<'a> {
     name: String,
     kind: &'a str,
@@ -100,7 +100,7 @@ struct Array<'a> {
     data: &'a str,
 }
 
-/// The arrays of a section; none if it is missing or cut off.
+/// The arrays of a section; empty if the section is missing or truncated.
 fn arrays<'a>(text: &'a str, section: &str) -> Vec<Array<'a>> {
     let inside = text
         .split_once(&format!("<{section}>"))
@@ -233,7 +233,7 @@ mod tests {
         other.threads.pop();
         assert!(error(&other).contains("a&b.vtu: ") && error(&other).contains("another case"), "{}", error(&other));
         let whole = fs::read(&path).unwrap();
-        // cut anywhere, or with a byte changed, it is refused or read: it never panics
+        // truncated or corrupted anywhere, it is refused or read: it never panics
         for i in 1..60 {
             let cut = whole.len() * i / 60;
             fs::write(&path, &whole[..cut]).unwrap();

@@ -1,4 +1,4 @@
-//! The buffers and stages of threads: beams, and bends between them.
+//! The buffers and stages of threads: beams, and bending between beams.
 
 use super::Tables;
 use super::builder::Builder;
@@ -8,10 +8,10 @@ use crate::elements::bend::Bend;
 use crate::kernel::buffer::Buffer;
 use crate::kernel::stage::{Code, Stage, flagged, wires};
 
-/// Items of a chunk.
+/// Items per chunk.
 const GRAIN: usize = 64;
 
-/// Buffers of beams. Those that may be missing are there in a scene with threads, and with what writes them.
+/// Buffers of beams. An optional buffer exists only in a scene that has threads and a stage that writes it.
 pub(super) struct Beams {
     pub count: usize,
     pub ends: Buffer,

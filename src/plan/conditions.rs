@@ -9,11 +9,11 @@ use crate::scene::{Scene, prescribed};
 pub struct Conditions {
     /// Node and mask of components of each condition, see [`crate::conditions::prescribed::NODES`].
     pub nodes: Vec<u32>,
-    /// Displacement at full amplitude, mm, three numbers a condition.
+    /// Displacement at full amplitude, mm, three numbers per condition.
     pub targets: Vec<f64>,
-    /// Number of load steps behind which each condition acts.
+    /// Number of load steps after which each condition acts.
     pub after: Vec<usize>,
-    /// Whether each node of the mesh never moves freely.
+    /// Whether each node of the mesh is always fully prescribed.
     pub held: Vec<bool>,
 }
 
@@ -44,7 +44,7 @@ impl Conditions {
         self.nodes.len() / 2
     }
 
-    /// Where each prescribed node ends, mm.
+    /// Final position of each prescribed node, mm.
     pub fn ends<'a>(&'a self, mesh: &'a Mesh) -> impl Iterator<Item = [f64; 3]> + 'a {
         let moved = |(n, by): (&[u32], &[f64])| [0, 1, 2].map(|k| mesh.nodes[n[0] as usize][k] + by[k]);
         self.nodes.chunks_exact(2).zip(self.targets.chunks_exact(3)).map(moved)

@@ -1,4 +1,4 @@
-//! Stages of contact: the grid, then candidates and forces of every kind of pair that can touch; ties.
+//! Stages of contact: the grid (broad phase), then candidates and forces for every kind of pair that can touch; ties.
 
 use super::beams::Beams;
 use super::builder::Builder;
@@ -27,7 +27,7 @@ pub struct FaceBuffers {
     /// List of near faces of each carrier, see [`crate::contact::surface::entry`], and gap counters of each point.
     pub near: Buffer,
     pub gaps: Buffer,
-    /// Bodies that each point touches, and [`memory::touch`] of each.
+    /// Bodies touched by each point, and the [`memory::touch`] of each.
     pub keys: Buffer,
     pub touches: Buffer,
     /// See [`crate::contact::found`].
@@ -52,23 +52,23 @@ pub(super) struct ContactParts {
     /// Of threads and of yarns on yarns.
     pub faces: [Option<FaceBuffers>; 2],
     pub pairs: Option<PairBuffers>,
-    /// Energies of ties, and how many there are.
+    /// Energies of ties, and the number of ties.
     pub ties: Option<(Buffer, usize)>,
     pub points: [Vec<ContactPoint>; 2],
 }
 
-/// What contact needs to know of the scene.
+/// The parts of the scene that contact needs.
 pub(super) struct ContactScene<'a> {
     pub chosen: &'a Contact,
     pub tables: &'a Tables<'a>,
     pub capacity: Capacity,
     pub nodes: &'a Nodes,
     pub beams: &'a Beams,
-    /// Displacements when everything was last searched, in quanta, in a scene that searches.
+    /// Displacements at the last full search, in quanta, in a scene that searches.
     pub before: Option<Buffer>,
 }
 
-/// Names of the buffers and stages of a kind of contact with faces.
+/// Names of the buffers and stages of one kind of contact with faces.
 struct Names {
     carriers: &'static str,
     nodes: &'static str,
@@ -111,7 +111,7 @@ const OF_YARNS: Names = Names {
     step: "yarn-yarn contact",
 };
 
-/// Where bodies near each other are found.
+/// The grid of the broad phase, where nearby bodies are found.
 struct Search {
     counts: Buffer,
     lists: Buffer,
@@ -132,14 +132,14 @@ struct Faces {
     faces: Buffer,
 }
 
-/// Where forces and stiffness of contact are added up.
+/// Sums of contact forces and stiffness.
 #[derive(Clone, Copy)]
 struct Added {
     force: Buffer,
     stiffness: Buffer,
 }
 
-/// Tables of the beams before and behind, see [`crate::contact::arc_offset`].
+/// Tables of the previous and next beams, see [`crate::contact::arc_offset`].
 #[derive(Clone, Copy)]
 struct Offsets {
     neighbours: Buffer,
@@ -184,13 +184,13 @@ impl ContactScene<'_> {
         Ok(ContactParts { params, force, stiffness, faces, pairs, ties, points })
     }
 
-    /// Where nodes are, and where they were.
+    /// Current and reference positions of nodes.
     fn place(&self) -> [(&'static str, Wire); 4] {
         let &Nodes { reference, quanta, remainder, .. } = self.nodes;
         wires![reference, quanta, remainder, before: self.before]
     }
 
-    /// The grid, for so many items.
+    /// The grid for a number of items.
     fn grid(&self, b: &mut Builder, items: usize, params: Params) -> Search {
         let cells = (params.cells[0] * params.cells[1]) as usize;
         let counts = b.add("items of cells", Kind::Uint, cells, false, Initial::Zero);
@@ -201,7 +201,7 @@ impl ContactScene<'_> {
         Search { counts, lists, boxes }
     }
 
-    /// Yarns in the grid.
+    /// Puts yarns into the grid.
     fn slabs(&self, b: &mut Builder, search: &Search, surfaces: &Surfaces, params: Params) -> Faces {
         let faces = b.indices("faces", surfaces.faces.clone());
         let slabs = b.indices("slabs", surfaces.slabs.clone());
@@ -213,7 +213,7 @@ impl ContactScene<'_> {
         Faces { slabs, faces }
     }
 
-    /// Threads in the grid, behind the slabs of yarns. What fills the grid may run side by side.
+    /// Puts threads into the grid, after the slabs of yarns. The stages that fill the grid may run concurrently.
     fn beams_to_grid(&self, b: &mut Builder, search: &Search, slabs: usize, offsets: Offsets, params: Params) {
         let status = self.nodes.status;
         let wires = [&self.place()[..], &search.wires(), &self.lines(offsets), &wires![status]].concat();
@@ -222,13 +222,13 @@ impl ContactScene<'_> {
         b.plan.search.push(Stage { first: slabs, waits: slabs == 0, ..stage });
     }
 
-    /// What the lines of beams follow from.
+    /// Inputs of the lines of beams.
     fn lines(&self, offsets: Offsets) -> [(&'static str, Wire); 4] {
         let Offsets { neighbours, shares } = offsets;
         wires![ends: self.beams.ends, beams: self.beams.table, neighbours, shares]
     }
 
-    /// Points of threads, or nodes of yarn surfaces, against yarns. What searches first waits for the grid.
+    /// Points of threads, or nodes of yarn surfaces, against yarns. The kind that is searched first waits for the grid.
     fn faces(
         &self,
         b: &mut Builder,
@@ -309,7 +309,7 @@ impl ContactScene<'_> {
         PairBuffers { sums, keys, state, found }
     }
 
-    /// Nodes of cut threads that are held; energies and number of ties.
+    /// Nodes of cut threads that are tied; energies and number of ties.
     fn tied(&self, b: &mut Builder, total: Added, params: Params) -> (Buffer, usize) {
         let held = &self.tables.scene.ties;
         let at = |tie: &Tie| std::iter::once(tie.node).chain(tie.corners).map(|node| node as u32).collect::<Vec<_>>();
@@ -325,7 +325,7 @@ impl ContactScene<'_> {
     }
 
     fn params(&self, surfaces: &Surfaces, slabs: usize) -> Params {
-        /// Aimed size of a cell, mm.
+        /// Target cell size, mm.
         const CELL: f64 = 0.5;
         let Tables { mesh, threads, conditions, active, .. } = self.tables;
         let mut low = [f64::INFINITY; 2];
@@ -337,7 +337,7 @@ impl ContactScene<'_> {
         }
         let (origin, size) = match mesh.period {
             Some(period) => ([0.0; 2], period),
-            // bodies that leave the box share its outermost cells
+            // bodies outside the box share its outermost cells
             None => ([low[0] - CELL, low[1] - CELL], [high[0] - low[0] + 2.0 * CELL, high[1] - low[1] + 2.0 * CELL]),
         };
         let cells = size.map(|s| (libm::floor(s / CELL) as u32).clamp(1, 1024));
@@ -363,7 +363,7 @@ impl ContactScene<'_> {
             friction: if active.friction { mesh.friction as f32 } else { 0.0 },
             tangential: self.chosen.tangential_ratio as f32,
             damping: self.chosen.damping_ratio as f32,
-            // a pair may reach 2²⁷ quanta, a node the sum of sixteen such pairs; pieces of threads push with 0.39 k L r at most
+            // a pair may reach 2²⁷ quanta, a node the sum of sixteen such pairs; line pieces push with at most 0.39 k L r
             force_quantum: (power((stiffest * (depth + radius)).max(along * radius)) / f64::from(1 << 27)) as f32,
             stiffness_quantum: (power(64.0 * stiffest.max(along)) / f64::from(1 << 28)) as f32,
             thread_radius: radius as f32,
@@ -371,7 +371,7 @@ impl ContactScene<'_> {
             self_arc: mesh.self_arc() as f32,
             depth: depth.min(f64::from(f32::MAX)) as f32,
             state: slot_state(active.friction) as u32,
-            // along each axis, so that it is as much in space
+            // per axis, so that the same distance results in space
             apart: quanta(SKIN_APART * self.chosen.skin_mm / libm::sqrt(3.0)) as u32,
         }
     }

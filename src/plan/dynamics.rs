@@ -1,4 +1,4 @@
-//! From forces to motion: assembly, prescribed motion, fibre lines, integration.
+//! From forces to motion: assembly, prescribed motion, fibre lines, integration by central differences.
 
 use super::Tables;
 use super::beams::{Beams, Bends};
@@ -16,17 +16,17 @@ use crate::kernel::position::quanta;
 use crate::kernel::stage::{Code, Stage, flagged, wires};
 use crate::mesh::Mesh;
 
-/// What assembly leaves for later stages.
+/// Results of assembly for later stages.
 pub(super) struct Assembled {
     /// Slots of thread nodes.
     pub thread_slots: Buffer,
-    /// What contact-aware mass adds, tonne.
+    /// Mass added by contact-aware mass scaling, tonne.
     pub added_mass: Option<Buffer>,
-    /// Least mass for the stiffness of elements, s².
+    /// Minimum nodal mass per element stiffness, s².
     pub mass_per_stiffness: f32,
 }
 
-/// Adds assembly to accelerations.
+/// Adds the stages from assembly to accelerations.
 pub(super) fn assemble(
     b: &mut Builder,
     t: &Tables,
@@ -81,7 +81,7 @@ pub(super) struct Held {
 }
 
 impl Held {
-    /// Adds prescribed motion, in a scene that has some.
+    /// Adds prescribed motion if the scene has any.
     pub fn add(b: &mut Builder, t: &Tables, nodes: &Nodes) -> Option<Self> {
         let count = t.conditions.count();
         if count == 0 {
@@ -99,7 +99,7 @@ impl Held {
     }
 }
 
-/// Adds fibre lines, in a scene that has some; what they add to accelerations.
+/// Adds fibre lines if the scene has any; returns their correction of the accelerations.
 pub(super) fn fibre_lines(b: &mut Builder, t: &Tables, nodes: &Nodes, held: Option<&Held>) -> Option<Buffer> {
     let lines = t.fibre_lines()?;
     let correction = b.scratch("line correction", 3 * nodes.count);

@@ -1,4 +1,4 @@
-//! Which effects a scene has: what its settings ask for, as far as something in it calls for them.
+//! Active effects of a scene: requested by its settings, and applicable to something in it.
 
 use crate::dynamics::fibre_lines::Group;
 use crate::dynamics::integrate::Works;
@@ -6,7 +6,7 @@ use crate::mesh::Mesh;
 use crate::scene::Scene;
 use crate::settings::steps::Step;
 
-/// The effects of a plan. One that is not here has no buffer, no stage and no text in it.
+/// The effects of a plan. An inactive effect adds no buffer, no stage and no shader text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Active {
     /// Contact by kind of pair.
@@ -22,12 +22,12 @@ pub struct Active {
     pub periodic: bool,
     pub fibre_lines: bool,
     pub contact_mass: bool,
-    /// Cut threads are held at yarns.
+    /// Cut threads are tied to yarns.
     pub ties: bool,
 }
 
 impl Active {
-    /// Effects of a scene whose fibre lines are known.
+    /// Effects of a scene with known fibre lines.
     pub fn new(scene: &Scene, lines: &[Group]) -> Self {
         let Scene { mesh, effects, .. } = scene;
         let (yarns, threads) = (mesh.blocks.len(), mesh.threads.len());
@@ -57,18 +57,18 @@ impl Active {
         }
     }
 
-    /// Whether bodies can meet, so that they must be looked for.
+    /// Whether bodies can meet, so that a contact search is needed.
     pub fn searches(self) -> bool {
         self.thread_yarn || self.yarn_yarn || self.thread_thread
     }
 
-    /// What changes the energy of nodes as they are integrated.
+    /// Kinds of work on nodes during integration.
     pub fn works(self) -> Works {
         Works { damping: self.damping, inertia: self.fibre_lines || self.contact_mass, gravity: self.gravity }
     }
 }
 
-/// Whether there are two beams far enough apart along their thread, or on two threads.
+/// Whether two beams exist that are far enough apart along their thread, or that belong to two threads.
 fn beams_can_meet(mesh: &Mesh) -> bool {
     let length = |thread: &crate::mesh::Thread| {
         let beam = |i| {

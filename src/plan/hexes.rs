@@ -1,4 +1,4 @@
-//! The buffers and stages of hexahedra, of the element and of the laws that the scene has.
+//! The buffers and stages of hexahedra, for the element type and the material laws of the scene.
 
 use super::Tables;
 use super::builder::Builder;
@@ -13,29 +13,29 @@ use crate::materials::neo_hookean::NeoHookean;
 use crate::materials::{Law, Material};
 use std::ops::Range;
 
-/// Buffers of hexahedra. Those that may be missing are there in a scene with solids, and with what writes them.
+/// Buffers of hexahedra. An optional buffer exists only in a scene that has solids and a stage that writes it.
 pub(super) struct Hexes {
     pub force: Buffer,
     pub bound: Buffer,
     pub energy: Option<Buffer>,
-    /// Energy of hourglass modes, of reduced integration.
+    /// Hourglass energy, for reduced integration.
     pub hourglass: Option<Buffer>,
-    /// Stress sums of periodic scenes.
+    /// Virial stress sums of periodic scenes.
     pub virial: Option<Buffer>,
-    /// Row sums of the stiffness of elements at nodes, and R/m: what bounds are weighed with.
+    /// Row sums of the element stiffness at nodes, and R/m, the weights of the bounds.
     pub limit: Buffer,
-    /// Bounds again, weighed.
+    /// Stages that weigh the bounds.
     pub weighed_bounds: Vec<Stage>,
 }
 
-/// What the stages of all laws bind and know.
+/// Bindings and parameters common to the stages of all laws.
 struct Common {
     wires: Vec<(&'static str, Wire)>,
     params: Params,
 }
 
 impl Hexes {
-    /// Adds tables, results and stages, but for those of weighed bounds.
+    /// Adds tables, results and stages, except the stages of the weighed bounds.
     pub fn add(b: &mut Builder, t: &Tables, nodes: &Nodes) -> Self {
         let limit = b.scratch("element stiffness of nodes", 2 * nodes.count);
         let hexes = t.solids.headers.len();
@@ -74,7 +74,7 @@ impl Hexes {
         all
     }
 
-    /// Adds the stages of the blocks of a law.
+    /// Adds the stages for the blocks of one law.
     fn stages<M: Material, const PERIODIC: bool>(&mut self, b: &mut Builder, common: &Common, blocks: &Range<usize>) {
         let forces = wires![out: self.force, out_virial: self.virial];
         let energies = wires![out: self.energy, out_hourglass: self.hourglass];
@@ -102,7 +102,7 @@ impl Hexes {
 
 impl Common {
     fn stage<K: Kernel>(&self, name: &'static str, blocks: &Range<usize>, wires: &[(&'static str, Wire)]) -> Stage {
-        /// Blocks in a chunk.
+        /// Blocks per chunk.
         const GRAIN: usize = 4;
         let wires = [&self.wires[..], wires].concat();
         let stage = Stage::new(name, Code::of::<K>(), (blocks.len(), GRAIN), &wires, self.params);

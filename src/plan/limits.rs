@@ -1,4 +1,4 @@
-//! The limit of the time step: row sums of stiffness at nodes, and their weighed means.
+//! The limit of the time step: row sums of the stiffness matrix at nodes, and their weighed means.
 
 use super::Tables;
 use super::beams::{Beams, Bends};
@@ -11,7 +11,7 @@ use crate::kernel::buffer::Buffer;
 use crate::kernel::stage::{Code, Stage, flagged, wires};
 use crate::mesh::Mesh;
 
-/// Adds the stages of the limit; where the weighed limit of each node is.
+/// Adds the stages of the limit; returns the buffer of the weighed limit of each node.
 pub(super) fn add(
     b: &mut Builder,
     t: &Tables,
@@ -61,7 +61,7 @@ pub(super) fn add(
     weighed
 }
 
-/// Nodes whose axial stiffness fibre lines, hexahedra or beams account for.
+/// Nodes whose axial stiffness is already counted by fibre lines, hexahedra or beams.
 fn covered(t: &Tables, nodes: &Nodes) -> Vec<bool> {
     let mut covered = vec![false; nodes.count];
     if t.active.fibre_lines {
@@ -79,7 +79,7 @@ fn covered(t: &Tables, nodes: &Nodes) -> Vec<bool> {
     covered
 }
 
-/// Row sums of axial stiffness that is not covered otherwise.
+/// Row sums of the axial stiffness that is not counted elsewhere.
 fn constant_stiffness(mesh: &Mesh, axial: &[f64], covered: &[bool]) -> Vec<f64> {
     let mut k = vec![0.0; mesh.nodes.len()];
     let blocks = mesh

@@ -1,9 +1,9 @@
 //! From a scene to buffers and stages. Reading [`build`] is reading the algorithm.
 //!
-//! A step: forces of hexahedra, beams, bends and contact, side by side; assembly to accelerations; prescribed motion;
-//! fibre lines; integration. When the contact skin is used up: grid, then candidates. For energies and limits: the
-//! diagnose stages, then the collect stages, which add up what the host reads. An effect that the scene does not have
-//! ([`Active`]) adds no buffer, no stage, and no text or branch to the stages that others share.
+//! A step has these stages: forces of hexahedra, beams, bends and contact, side by side; assembly to accelerations; prescribed
+//! motion; fibre lines; integration. When the contact skin (Verlet skin) is used up: grid, then candidates. For energies and
+//! limits: the diagnose stages, then the collect stages, which sum what the host reads. An inactive effect ([`Active`]) adds no
+//! buffer, no stage, and no text or branch to shared stages.
 #![warn(clippy::too_many_lines)]
 
 mod beams;
@@ -48,7 +48,7 @@ pub use totals::{Largest, Sums, Totals};
 /// The plan of a scene.
 ///
 /// # Errors
-/// Geometry that cannot be run: inverted elements, motions that contradict each other.
+/// Geometry that cannot be run: inverted elements, contradictory motions.
 pub fn build(scene: &Scene, capacity: Capacity) -> Result<Model> {
     let tables = Tables::new(scene)?;
     let (t, b) = (&tables, &mut Builder::default());
@@ -84,10 +84,10 @@ pub fn build(scene: &Scene, capacity: Capacity) -> Result<Model> {
     Ok(Model::new(std::mem::take(&mut b.plan), parts, forces, totals, slip))
 }
 
-/// A scene and the tables that are made of it.
+/// A scene and the tables built from it.
 struct Tables<'a> {
     scene: &'a Scene,
-    /// The mesh where it is computed.
+    /// The computational mesh.
     mesh: Cow<'a, Mesh>,
     conditions: Conditions,
     active: Active,
@@ -109,12 +109,12 @@ impl<'a> Tables<'a> {
         Ok(Self { scene, mesh, conditions, active, lines, solids, threads })
     }
 
-    /// How fibre lines are chosen, if the scene has some.
+    /// Settings of the fibre lines, if the scene has any.
     fn fibre_lines(&self) -> Option<&FibreLines> {
         self.scene.effects.fibre_lines.as_ref().filter(|_| self.active.fibre_lines)
     }
 
-    /// Whether fibre lines go along threads.
+    /// Whether fibre lines also run along threads.
     fn lines_on_threads(&self) -> bool {
         self.fibre_lines().is_some_and(|lines| lines.threads)
     }
@@ -135,7 +135,7 @@ impl<'a> Tables<'a> {
     }
 }
 
-/// What the pieces of a plan leave for those that come after them.
+/// Results of the pieces of a plan for later pieces.
 struct Parts<'a> {
     tables: Tables<'a>,
     nodes: Nodes,
@@ -146,7 +146,7 @@ struct Parts<'a> {
     contact: Option<ContactParts>,
     assembled: Assembled,
     held: Option<Held>,
-    /// What fibre lines add to accelerations.
+    /// Correction of accelerations by fibre lines.
     correction: Option<Buffer>,
     weighed_limit: Buffer,
 }
@@ -162,7 +162,7 @@ impl Parts<'_> {
         self.contact.as_ref().and_then(|contact| contact.pairs)
     }
 
-    /// How many contact points threads and yarns have.
+    /// Number of contact points of threads and of yarns.
     fn points(&self) -> [usize; 2] {
         self.contact.as_ref().map_or([0; 2], |contact| [0, 1].map(|kind| contact.points[kind].len()))
     }

@@ -1,4 +1,4 @@
-//! What the host knows of a plan: the buffers that it reads, and where things of the scene are in them.
+//! The host's view of a plan: the buffers that it reads, and the places of scene entities in them.
 
 use super::contact::FaceBuffers;
 use super::totals::Totals;
@@ -8,20 +8,20 @@ use crate::elements::LANES;
 use crate::kernel::buffer::Buffer;
 use crate::kernel::stage::{Plan, Stage};
 
-/// A plan, and what the host must know to drive it and to understand what it computes.
+/// A plan with everything the host needs to drive it and to interpret its results.
 pub struct Model {
     pub plan: Plan,
     pub active: Active,
-    /// Stages of a step up to accelerations; the others move nodes.
+    /// Number of stages of a step up to accelerations; the remaining stages move nodes.
     pub forces: usize,
-    /// Those of the collect stages that see what motion has changed.
+    /// The collect stages that depend on the motion of the step.
     pub collect_motion: Vec<Stage>,
     pub buffers: Buffers,
     pub totals: Totals,
-    /// True mass of every node, tonne, and mass with the floor.
+    /// True mass of every node, and mass with the floor, tonne.
     pub true_mass: Vec<f64>,
     pub mass: Vec<f64>,
-    /// Of all solids and of all threads: true mass, and what the floor adds to it, tonne.
+    /// True mass of all solids and of all threads, and the mass added to each by the floor, tonne.
     pub whole_mass: [[f64; 2]; 2],
     pub first_thread: usize,
     /// Block and lane of each hexahedron, in the order of the mesh.
@@ -32,26 +32,26 @@ pub struct Model {
     pub hex_volume: Vec<f64>,
     /// Contact points of threads and of yarn surfaces on yarns.
     pub points: [Vec<ContactPoint>; 2],
-    /// Numbers of a touch of a point, and of a slot of a beam.
+    /// Numbers stored per touch of a point, and per slot of a beam.
     pub touch: usize,
     pub slot_state: usize,
     /// Largest share of the smallest contact radius or yarn thickness, mm, for guards.
     pub limits: Limits,
-    /// Number of load steps behind which each prescribed node is, in the order of their table.
+    /// Number of load steps after which each prescribed node acts, in table order.
     pub acts_after: Vec<usize>,
 }
 
 /// A contact point.
 #[derive(Debug, Clone, Copy)]
 pub struct ContactPoint {
-    /// Nodes that it lies between, and its share in each.
+    /// Nodes that carry it, and its share in each.
     pub nodes: [usize; 2],
     pub shares: [f64; 2],
-    /// mm² of a yarn surface, mm of a thread.
+    /// mm² for a yarn surface, mm for a thread.
     pub measure: f64,
 }
 
-/// Sizes that guards compare penetrations with, mm.
+/// Sizes with which guards compare penetrations, mm.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     pub thread_radius: f64,
@@ -65,14 +65,14 @@ pub struct Buffers {
     pub quanta: Buffer,
     pub remainder: Buffer,
     pub velocity: Buffer,
-    /// Of the last step, mm/s² and 1/tonne, and what fibre lines add to the first.
+    /// Acceleration and inverse mass of the last step, mm/s² and 1/tonne, and the correction by fibre lines.
     pub acceleration: Buffer,
     pub inverse_mass: Buffer,
     pub correction: Option<Buffer>,
-    /// What contact-aware mass adds, tonne.
+    /// Mass added by contact-aware mass scaling, tonne.
     pub added_mass: Option<Buffer>,
     pub status: Buffer,
-    /// Displacements when everything was last searched, in quanta.
+    /// Displacements at the last full search, in quanta.
     pub before: Option<Buffer>,
     pub hex_energy: Option<Buffer>,
     pub beam_tension: Option<Buffer>,
@@ -81,7 +81,7 @@ pub struct Buffers {
     pub contact_stiffness: Option<Buffer>,
     /// Of threads and of yarns on yarns.
     pub faces: [Option<FaceBuffers>; 2],
-    /// See [`crate::contact::found`]: of both, and of beams.
+    /// See [`crate::contact::found`]: for threads, yarns and beams.
     pub found: [Option<Buffer>; 3],
     pub pair_sums: Option<Buffer>,
     pub pair_keys: Option<Buffer>,
@@ -92,8 +92,8 @@ pub struct Buffers {
     pub slip: [Option<Buffer>; 2],
 }
 
-/// Sizes of contact's tables, which grow when they overflow: faces near a beam or a node up to [`Self::MOST_FACES`], slots for
-/// bodies up to [`Self::MOST_SLOTS`], those of beams up to [`MOST_PAIRS`](crate::contact::threads::MOST_PAIRS).
+/// Sizes of the contact tables, which grow when they overflow: faces near a beam or node up to [`Self::MOST_FACES`], slots for
+/// bodies up to [`Self::MOST_SLOTS`], slots of beams up to [`MOST_PAIRS`](crate::contact::threads::MOST_PAIRS).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacity {
     pub cell: usize,
@@ -114,7 +114,7 @@ impl Default for Capacity {
 }
 
 impl Model {
-    /// The model of a plan from its parts; a step has so many stages of `forces`.
+    /// The model of a plan from its parts; `forces` is the number of stages up to accelerations.
     pub(super) fn new(plan: Plan, p: Parts, forces: usize, totals: Totals, slip: [Option<Buffer>; 2]) -> Self {
         let Parts { tables, nodes, .. } = &p;
         let sees_motion = |stage: &&Stage| {

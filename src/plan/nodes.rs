@@ -1,4 +1,4 @@
-//! The state of nodes: positions, velocities, masses, and what a step makes of them.
+//! The state of nodes: positions, velocities, masses, and the results of a step.
 
 use super::builder::{Builder, NODE_GRAIN};
 use super::{Tables, perturbation};
@@ -20,12 +20,12 @@ pub(super) struct Nodes {
     pub mass: Buffer,
     pub status: Buffer,
     pub acceleration: Buffer,
-    /// Mass that gravity pulls on, in a scene with gravity.
+    /// Mass subject to gravity, in a scene with gravity.
     pub true_mass: Option<Buffer>,
     pub inverse_mass: Buffer,
-    /// Works by kind, if any is kept.
+    /// Work by kind, if any is recorded.
     pub work: Option<Buffer>,
-    /// True masses, tonne, and masses with the floor.
+    /// True nodal masses, and masses with the floor, tonne.
     pub true_masses: Vec<f64>,
     pub masses: Vec<f64>,
 }
@@ -57,7 +57,7 @@ impl Nodes {
         }
     }
 
-    /// True mass of all solids and of all threads, tonne, and what the floor adds to it.
+    /// True mass of all solids and of all threads, and the mass added to each by the floor, tonne.
     pub fn whole_mass(&self) -> [[f64; 2]; 2] {
         [0..self.first_thread, self.first_thread..self.count].map(|range| {
             let [mass, truly] = [&self.masses, &self.true_masses].map(|mass| mass[range.clone()].iter().sum::<f64>());
@@ -66,16 +66,16 @@ impl Nodes {
     }
 }
 
-/// Where nodes were when candidates were last looked for.
+/// Node positions at the last candidate search.
 pub(super) struct Searched {
     quanta: Buffer,
     remainder: Buffer,
-    /// Displacements when everything was last searched, in quanta.
+    /// Displacements at the last full search, in quanta.
     pub everything: Buffer,
 }
 
 impl Searched {
-    /// Adds what is known of the last search, in a scene that searches, and the stage that watches nodes.
+    /// Adds the data of the last search and the stage that watches nodes, in a scene that searches.
     pub fn add(b: &mut Builder, t: &Tables, nodes: &Nodes) -> Option<Self> {
         let all = 3 * nodes.count;
         let searched = t.active.searches().then(|| Self {
@@ -106,7 +106,7 @@ impl Searched {
     }
 }
 
-/// Velocities at the start, in planes.
+/// Initial velocities, in planes.
 fn initial_velocity(mesh: &Mesh) -> Vec<f64> {
     let nodes = mesh.nodes.len();
     let mut planes = vec![0.0; 3 * nodes];
@@ -120,7 +120,7 @@ fn initial_velocity(mesh: &Mesh) -> Vec<f64> {
     planes
 }
 
-/// Mass with a floor of a share of the body's mean nodal mass.
+/// Nodal mass with a floor, given as a share of the mean nodal mass of the body.
 fn floor_mass(mesh: &Mesh, mass: &[f64], floor: f64) -> Vec<f64> {
     let mut floored = mass.to_vec();
     let blocks = mesh.blocks.iter().map(|b| (b.first, b.count()));

@@ -1,10 +1,10 @@
-//! Where a scene starts whose scatter by chance is to be measured: every body a little aside of where it was built.
+//! Initial perturbation to measure scatter: every body starts slightly off its generated position.
 //!
 //! Fibres are so stiff that a micrometre from one node to the next would load them more than any test does. So bodies follow
-//! smooth functions of the way along them, with values of their own every 10 mm, which is less than a lap of the stitch is long.
-//! Yarns move across their fibres only, each cross-section as a whole, so that fibres bend and are not strained. Threads, which
-//! are softer, move in all directions: an amplitude of 1 µm strains them by 1e-4, and by 1e-3 at most. Nodes that are
-//! prescribed stay, and a thread beside them reaches its displacement within 10 mm.
+//! smooth functions of the arc length with independent values every 10 mm, which is less than the thread length of one stitch
+//! lap. Yarns move only across their fibres, each cross-section as a whole, so fibres bend without strain. Threads are softer
+//! and move in all directions: an amplitude of 1 µm strains them by 1e-4, and by 1e-3 at most. Prescribed nodes stay, and a
+//! thread reaches its displacement within 10 mm of them.
 
 use super::conditions::Conditions;
 use crate::kernel::math::smooth;
@@ -16,7 +16,7 @@ use xxhash_rust::xxh3::xxh3_64;
 /// Length between independent values, mm.
 const WAVE: f64 = 10.0;
 
-/// Displacements at the start in quanta, all along x, then y, then z, within ± an amplitude in mm along every axis.
+/// Initial displacements in quanta, all along x, then y, then z, within ± an amplitude in mm along every axis.
 pub fn start(mesh: &Mesh, amplitude: f64, conditions: &Conditions) -> Vec<i32> {
     let nodes = mesh.nodes.len();
     let mut start = vec![0; 3 * nodes];
@@ -59,7 +59,7 @@ fn chain(mesh: &Mesh, thread: &Thread, body: usize, stays: &[bool], put: &mut im
     }
     let length = thread.wrap.map(|_| arcs[thread.beams()]);
     let wave = Wave::new(body, length);
-    // way from the nearest node that stays
+    // arc length from the nearest node that stays
     let held: Vec<f64> = (0..thread.count).filter(|i| stays[*i]).map(|i| arcs[i]).collect();
     for (i, &arc) in arcs[..thread.count].iter().enumerate() {
         let after = held.partition_point(|h| *h < arc);
@@ -69,17 +69,17 @@ fn chain(mesh: &Mesh, thread: &Thread, body: usize, stays: &[bool], put: &mut im
     }
 }
 
-/// A smooth function of the way along a body, every body its own, within ±1 along every axis.
+/// A smooth function of the arc length along a body, independent for every body, within ±1 along every axis.
 struct Wave {
     body: usize,
-    /// Length between values, mm.
+    /// Distance between values, mm.
     step: f64,
     /// Number of values of a body that closes on itself.
     values: Option<i64>,
 }
 
 impl Wave {
-    /// Of an open body, or of one that repeats after a length.
+    /// For an open body, or with a period `length` for a closed one.
     fn new(body: usize, length: Option<f64>) -> Self {
         let values = length.map(|length| (length / WAVE).round().max(1.0));
         let step = values.zip(length).map_or(WAVE, |(values, length)| length / values);

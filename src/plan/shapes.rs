@@ -1,4 +1,4 @@
-//! What hexahedra keep of their reference shape, in the frame of the fibre.
+//! Reference shape data of hexahedra, in the frame of the fibre.
 
 use crate::elements::block::BINARY;
 use crate::elements::hex8_reduced::MODES;
@@ -17,8 +17,8 @@ fn slope(corner: usize, point: usize) -> [f64; 3] {
     [0.5 * sign[0] * f[1] * f[2], 0.5 * sign[1] * f[0] * f[2], 0.5 * sign[2] * f[0] * f[1]]
 }
 
-/// Inverse Jacobians and volumes at the Gauss points of a hexahedron with these corners (in mesh order); the volume that is
-/// not positive as an error.
+/// Inverse Jacobians and volumes at the Gauss points of a hexahedron with these corners (in mesh order); a volume that is not
+/// positive is returned as the error.
 pub fn points(corners: &[[f64; 3]; 8]) -> std::result::Result<[Point; 8], f64> {
     let mut points = [([[0.0; 3]; 3], 0.0); 8];
     for (point, result) in points.iter_mut().enumerate() {
@@ -44,23 +44,23 @@ pub fn points(corners: &[[f64; 3]; 8]) -> std::result::Result<[Point; 8], f64> {
     Ok(points)
 }
 
-/// Numbers of [`hex8`](crate::elements::hex8): inverse Jacobians, halved since kernels take differences of corners, twice the
-/// derivative; volumes.
+/// Numbers of [`hex8`](crate::elements::hex8): inverse Jacobians, halved because kernels use differences of corners, which are
+/// twice the derivative; volumes.
 pub fn full(points: &[Point; 8]) -> Vec<f64> {
     let numbers = |(inverse, volume): &Point| inverse.as_flattened().iter().map(|x| 0.5 * x).chain([*volume]).collect();
     points.iter().map(numbers).collect::<Vec<Vec<f64>>>().concat()
 }
 
-/// Numbers of [`hex8_reduced`](crate::elements::hex8_reduced): mean gradients B of the shape functions, for which two Gauss
-/// points a direction are exact, as half of their differences and sums over edges along ξ; the volume; Σ h X of the modes;
-/// their stiffness.
+/// Numbers of [`hex8_reduced`](crate::elements::hex8_reduced): mean gradients B of the shape functions, stored as half of their
+/// differences and sums over edges along ξ (two Gauss points per direction integrate them exactly); the volume; Σ h X of the
+/// hourglass modes; the hourglass stiffness.
 ///
-/// The stiffness k = G ∫ |∇h|² dV / 8² in the parallelepiped with the mean gradients of (ξ, η, ζ) at right angles resists u = q h/8
-/// as if every component of the displacement gradient had the `modulus` G, MPa, and the integration were full.
+/// The stiffness k = G ∫ |∇h|² dV / 8² is taken in the parallelepiped that has the mean gradients of (ξ, η, ζ) at right angles.
+/// It resists u = q h/8 as if every component of the displacement gradient had the `modulus` G, MPa, under full integration.
 pub fn reduced(points: &[Point; 8], corners: &[[f64; 3]; 8], modulus: f64) -> Vec<f64> {
     let volume: f64 = points.iter().map(|(_, volume)| volume).sum();
     let mut means = [[0.0; 3]; 8];
-    // squares of the mean gradients of ξ, η and ζ, which are what the corners' signs interpolate
+    // squares of the mean gradients of ξ, η and ζ, which the signs of the corners interpolate
     let mut gradients = [[0.0; 3]; 3];
     let mut moments = [[0.0; 3]; 4];
     for (corner, &binary) in BINARY.iter().enumerate() {
@@ -79,7 +79,7 @@ pub fn reduced(points: &[Point; 8], corners: &[[f64; 3]; 8], modulus: f64) -> Ve
         }
     }
     let [xi, eta, zeta] = gradients.map(|g| g.iter().map(|g| g * g).sum::<f64>());
-    // the mean of ξ² is a third, that of ξ² η² a ninth
+    // the mean of ξ² is a third, the mean of ξ² η² a ninth
     let shares = [(eta + zeta) / 3.0, (xi + zeta) / 3.0, (xi + eta) / 3.0, (xi + eta + zeta) / 9.0];
     let stiffness = shares.map(|share| modulus * volume * share / 64.0);
     let halves = means.chunks_exact(2).flat_map(|ends| {

@@ -23,9 +23,9 @@ pub struct Solids {
     pub laws: Vec<(Law, std::ops::Range<usize>)>,
     /// Block and lane of each hexahedron, in the order of the mesh.
     pub place: Vec<(usize, usize)>,
-    /// Corner slots of each solid node: where its x force is.
+    /// Corner slots of each solid node: index of the x force.
     pub slots: Vec<u32>,
-    /// Where its corner stiffness bounds are.
+    /// Indices of the corner stiffness bounds of each solid node.
     pub bounds: Vec<u32>,
     /// Lumped mass of solid nodes, tonne.
     pub mass: Vec<f64>,
@@ -37,17 +37,17 @@ pub struct Solids {
 
 /// A hexahedron of the mesh.
 struct Hex {
-    /// In the order of the mesh.
+    /// Index in the order of the mesh.
     index: usize,
     block: usize,
     corners: [Seen; 8],
 }
 
 impl Solids {
-    /// Tables of a mesh; with a hourglass coefficient, for hexahedra with reduced integration.
+    /// Tables of a mesh; an hourglass coefficient selects hexahedra with reduced integration.
     ///
     /// # Errors
-    /// Names a hexahedron that is inside out.
+    /// Names an inverted hexahedron.
     pub fn new(mesh: &Mesh, hourglass: Option<f64>) -> Result<Self> {
         let nodes = mesh.first_thread_node();
         let mut tables = Self {
@@ -61,7 +61,7 @@ impl Solids {
         };
         let frames: Vec<_> = mesh.blocks.iter().map(|b| frame(b.fibre)).collect();
         tables.frames = frames.iter().flatten().flatten().copied().collect();
-        // blocks of lanes by law, fibre direction and material: runs of sixteen along a line first, the rest after them
+        // blocks of lanes by law, fibre direction and material: runs of sixteen along a line first, the rest afterwards
         let mut groups: BTreeMap<(Law, usize), (Vec<Hex>, Vec<Hex>)> = BTreeMap::new();
         let mut index = 0;
         for (number, block) in mesh.blocks.iter().enumerate() {
@@ -95,7 +95,7 @@ impl Solids {
         Ok(tables)
     }
 
-    /// Adds a block of up to sixteen hexahedra; empty lanes repeat the last one without volume.
+    /// Adds a block of up to sixteen hexahedra; empty lanes repeat the last one with zero volume.
     fn push(
         &mut self,
         mesh: &Mesh,
@@ -174,7 +174,7 @@ impl Solids {
                     section *= if k == 0 { 1.0 } else { factor };
                 }
                 self.mass[hex.corners[corner].node] += block.density * volume * weight;
-                // the slope of a line's shape function along the fibre
+                // derivative of the linear shape function along the fibre
                 let slope = 0.5 * inverse[0][0];
                 axial[corner] += fibre_stiffness * volume * section * slope * slope;
             }
@@ -196,14 +196,15 @@ pub(super) fn thickness(mesh: &Mesh, block: &Block) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Puts a slot into the first free place of a node.
+/// Writes a slot to the first free place of a node.
 fn put(table: &mut [u32], node: usize, slot: usize) {
     let places = &mut table[SOLID * node..][..SOLID];
     let free = places.iter_mut().find(|p| **p == NONE).expect("a node of a structured block has at most eight corners");
     *free = slot as u32;
 }
 
-/// Orthonormal frame with the fibre as first axis and the second in the plane of the fabric: `frame[i][j]` is component i of axis j.
+/// Orthonormal frame with the fibre as first axis and the second axis in the plane of the fabric: `frame[i][j]` is component i
+/// of axis j.
 fn frame(fibre: [f64; 3]) -> [[f64; 3]; 3] {
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -218,7 +219,7 @@ fn frame(fibre: [f64; 3]) -> [[f64; 3]; 3] {
     std::array::from_fn(|i| [first[i], second[i], third[i]])
 }
 
-/// Corners in mm along the axes of a frame.
+/// Corners in the axes of a frame, mm.
 fn local(edges: &[[i32; 3]; 8], frame: &[[f64; 3]; 3]) -> [[f64; 3]; 8] {
     edges
         .map(|e| e.map(|q| f64::from(q) * QUANTUM))

@@ -1,4 +1,4 @@
-//! Tables of contact: faces of all bodies, slabs of them for the grid, and what carries contact points.
+//! Tables of contact: faces of all bodies, face slabs for the grid, and carriers of contact points.
 
 use super::ContactPoint;
 use super::effects::Active;
@@ -13,7 +13,7 @@ use crate::mesh::surface::{Surface, owned};
 use crate::mesh::{Mesh, Seen};
 use crate::settings::effects::Contact;
 
-/// What carries contact points: see [`crate::contact::candidates::CARRIER`], [`crate::contact::surface::CARRIED`] and
+/// Carriers of contact points: see [`crate::contact::candidates::CARRIER`], [`crate::contact::surface::CARRIED`] and
 /// [`crate::contact::surface::POINT`].
 #[derive(Default)]
 pub struct Carried {
@@ -30,7 +30,7 @@ pub struct Surfaces {
     pub faces: Vec<u32>,
     /// See [`crate::contact::grid::SLAB`].
     pub slabs: Vec<u32>,
-    /// Points of threads and nodes of yarns that touch yarns.
+    /// Points of threads and nodes of yarns that can touch yarns.
     pub carried: [Carried; 2],
 }
 
@@ -38,7 +38,7 @@ impl Surfaces {
     /// Tables of a mesh for the pairs that can touch.
     ///
     /// # Errors
-    /// More nodes or faces than their tables can number.
+    /// More nodes or faces than the tables can number.
     pub fn new(mesh: &Mesh, threads: &Threads, contact: &Contact, active: Active) -> Result<Self> {
         let mut t = Self::default();
         if !active.thread_yarn && !active.yarn_yarn {
@@ -102,7 +102,7 @@ fn of_threads(mesh: &Mesh, threads: &Threads, contact: &Contact) -> Carried {
     let mut carried = Carried::default();
     for (thread, lengths) in mesh.threads.iter().zip(&lengths) {
         let (beams, count) = (thread.beams(), thread.count);
-        // the node at a place that is counted on through a closed thread
+        // the node at a place; the count continues through a closed thread
         let node = |place: isize| {
             let turns = place.div_euclid(count as isize) as i32;
             let image = thread.wrap.unwrap_or_default().map(|wrap| turns * wrap);

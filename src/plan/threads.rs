@@ -1,9 +1,9 @@
 //! Tables of the beams: ends, vectors, stiffness, rest curvature, slots of nodes, lumped mass.
 //!
-//! A beam is a chord of the curve it stands for, and what is tightened is thread along the curve: at full pre-tension
-//! N = EA (l/s − 1 − ε_th), with s the length of the curve. Taken for s, the chords of 60 beams a lap would leave the shipped
-//! cell 0.24 % short of thread, and too tight. Since beams know chords L₀, the table holds EA L₀/s, and the
-//! thermal strain is ε_th s/L₀ + s/L₀ − 1. Threads start at rest as generated, and those that nothing tightens stay so.
+//! A beam is a chord of the curve that it represents, but pretension acts on the thread along the curve: at full pretension N =
+//! EA (l/s − 1 − ε_th), with s the length of the curve. With the chord length in place of s, 60 beams per lap would leave the
+//! shipped cell 0.24 % short of thread, and too tight. Since beams know only chord lengths L₀, the table holds EA L₀/s, and the
+//! thermal strain is ε_th s/L₀ + s/L₀ − 1. Threads start at rest as generated, and threads without pretension stay at rest.
 
 use crate::contact::arc_offset;
 use crate::dynamics::assemble::{BENT, NONE, THREAD};
@@ -24,12 +24,12 @@ pub struct Threads {
     pub bends: Vec<f64>,
     /// Thermal strain of each beam.
     pub thermal: Vec<f64>,
-    /// Slots of beams at each thread node, and of bends if there are any.
+    /// Slots of beams at each thread node, and of bends if the scene has any.
     pub slots: Vec<u32>,
     pub bend_slots: Vec<u32>,
     /// Lumped mass of thread nodes, tonne.
     pub mass: Vec<f64>,
-    /// Length that belongs to each thread node, mm.
+    /// Tributary length of each thread node, mm.
     pub tributary: Vec<f64>,
     /// EA/L₀ of the beam that starts at each thread node, N/mm.
     pub line_stiffness: Vec<f64>,
@@ -43,7 +43,7 @@ pub struct Threads {
 }
 
 impl Threads {
-    /// Tables of a mesh, with or without bends; `held` nodes never move freely.
+    /// Tables of a mesh, with or without bends; `held` nodes are always fully prescribed.
     pub fn new(mesh: &Mesh, bending: bool, held: &[bool]) -> Self {
         let first = mesh.first_thread_node();
         let nodes = mesh.nodes.len() - first;
@@ -101,7 +101,7 @@ impl Threads {
                 let stiffness = 2.0 * thread.bending / (0.5 * (l1 + l2));
                 t.bends.extend([stiffness, smoothed(turn)]);
                 t.pairs.extend(pair.map(|b| b as u32));
-                // E ≈ S/4 |v₀/l₁ − v₁ (1/l₁ + 1/l₂) + v₂/l₂|²: row sums of its stiffness over nodes that can swing
+                // E ≈ S/4 |v₀/l₁ − v₁ (1/l₁ + 1/l₂) + v₂/l₂|²: row sums of its stiffness over nodes that are free to vibrate
                 let weights = [1.0 / l1, 1.0 / l1 + 1.0 / l2, 1.0 / l2];
                 let nodes = [t.ends[2 * pair[0]], t.ends[2 * pair[0] + 1], t.ends[2 * pair[1] + 1]];
                 let swings = nodes.iter().zip(&weights).filter(|(node, _)| !held[**node as usize]);
@@ -116,7 +116,7 @@ impl Threads {
         t
     }
 
-    /// Tables of the line of a thread, whose first beam is number `base` of all, from the lengths of its beams.
+    /// Tables of the line of a thread from the lengths of its beams; `base` is the global number of its first beam.
     fn line(&mut self, thread: usize, base: usize, wrap: Option<[i32; 2]>, lengths: &[f64]) {
         let count = lengths.len();
         let whole: f64 = lengths.iter().sum();

@@ -1,4 +1,4 @@
-//! The stages that add up what kernels keep per item, and where the host finds the sums.
+//! The stages that sum per-item results of kernels, and the places of the sums for the host.
 
 use super::beams::Beams;
 use super::builder::Builder;
@@ -16,7 +16,7 @@ use crate::kernel::position::quanta;
 use crate::kernel::stage::{Code, Stage, flagged, wires};
 use std::ops::Range;
 
-/// Where sums of columns are in the totals, part by part.
+/// Places of the column sums in the totals, part by part.
 #[derive(Debug, Clone, Copy)]
 pub struct Sums {
     into: usize,
@@ -32,7 +32,7 @@ impl Sums {
     }
 }
 
-/// Where the largest numbers of a column are in the totals, part by part.
+/// Places of the column maxima in the totals, part by part.
 #[derive(Debug, Clone, Copy)]
 pub struct Largest {
     into: usize,
@@ -41,7 +41,7 @@ pub struct Largest {
 }
 
 impl Largest {
-    /// The largest number and its place in the column; of equal ones the first.
+    /// The largest number and its index in the column; the first of equal ones.
     pub fn of(&self, totals: &[f64]) -> (f64, usize) {
         let parts = totals[self.into..][..WORST * self.parts].chunks_exact(WORST).enumerate();
         let found = parts.map(|(number, part)| (part[0], number * self.length + part[1] as usize));
@@ -49,18 +49,18 @@ impl Largest {
     }
 }
 
-/// What the host finds in the totals; `None` for what the scene does not have.
+/// The contents of the totals; `None` for effects that the scene does not have.
 #[derive(Debug, Clone)]
 pub struct Totals {
     pub buffer: Buffer,
-    /// Work on nodes, one column a kind, and which kinds there are.
+    /// Work on nodes, one column per kind, and the kinds that exist.
     pub work: Option<Sums>,
     pub works: Works,
     pub thermal: Option<Sums>,
     pub reaction: Option<Sums>,
-    /// Of hexahedra, beams and bends: nine components each.
+    /// Virial stress of hexahedra, beams and bends: nine components each.
     pub stress: Vec<Sums>,
-    /// Of points and pairs of beams: columns as in [`crate::contact::sums`].
+    /// Sums of points and of pairs of beams: columns as in [`crate::contact::sums`].
     pub contact: Vec<Sums>,
     /// Elastic energy of ties.
     pub ties: Option<Sums>,
@@ -71,7 +71,7 @@ pub struct Totals {
     pub axial: Option<Sums>,
     pub bending: Option<Sums>,
     pub kinetic: Sums,
-    /// With the affine motion; `None` if there is none.
+    /// Kinetic energy including the affine motion; `None` without affine motion.
     pub kinetic_total: Option<Sums>,
     /// Mass added to solids and to threads.
     pub added: [Option<Sums>; 2],
@@ -81,7 +81,7 @@ pub struct Totals {
     pub stiffness: Largest,
 }
 
-/// Items of a chunk: about as many numbers as a chunk of nodes has.
+/// Items per chunk: about as many numbers as a chunk of nodes has.
 const GRAIN: usize = 4;
 
 /// Columns of a buffer.
@@ -98,11 +98,11 @@ impl Columns {
     fn range(range: Range<usize>) -> Self {
         Self { start: range.start, count: range.len(), lanes: range.len(), stride: range.len(), columns: 1 }
     }
-    /// Planes behind each other.
+    /// Consecutive planes.
     fn planes(count: usize, columns: usize) -> Self {
         Self { columns, ..Self::range(0..count) }
     }
-    /// Rows of so many numbers.
+    /// Rows of `columns` numbers.
     fn rows(count: usize, columns: usize) -> Self {
         Self { start: 0, count, lanes: 1, stride: columns, columns }
     }
@@ -119,7 +119,7 @@ struct Collector<'a> {
 }
 
 impl Collector<'_> {
-    /// Room for the results of every part of a column.
+    /// Reserves space for the results of every part of a column.
     fn room(&mut self, count: usize, columns: usize) -> (Sums, usize) {
         let (length, parts) = totals::parts(count);
         let len = &mut self.b.plan.buffers[self.totals.0].len;
@@ -140,7 +140,7 @@ impl Collector<'_> {
         }
     }
 
-    /// Sums of columns, whose numbers are then set to zero.
+    /// Sums of columns, whose numbers are reset to zero.
     fn taken(&mut self, buffer: Buffer, columns: Columns, waits: bool) -> Sums {
         let (sums, length) = self.room(columns.count, columns.columns);
         let params = self.params(&columns, sums, length);
@@ -151,7 +151,7 @@ impl Collector<'_> {
         sums
     }
 
-    /// Sums of columns.
+    /// Sums of columns, whose numbers are kept.
     fn kept(&mut self, buffer: Buffer, columns: Columns) -> Sums {
         let (sums, length) = self.room(columns.count, columns.columns);
         let params = self.params(&columns, sums, length);
@@ -161,7 +161,7 @@ impl Collector<'_> {
         sums
     }
 
-    /// The largest of a column; with the lanes in use of blocks, the largest of the negative.
+    /// The maximum of a column; with a mask of used lanes, the maximum of the negated numbers.
     fn largest(&mut self, buffer: Buffer, columns: Columns, lanes_used: Option<Buffer>) -> Largest {
         let (sums, length) = self.room(columns.count, WORST);
         let params = self.params(&columns, sums, length);
@@ -171,7 +171,7 @@ impl Collector<'_> {
         Largest { into: sums.into, parts: sums.parts, length }
     }
 
-    /// ½ Σ m v² of nodes; `total` with the affine motion.
+    /// ½ Σ m v² of nodes; `total` includes the affine motion.
     fn kinetic(&mut self, p: &Parts, total: bool) -> Sums {
         let masses = &p.nodes.masses;
         let whole: f64 = masses.iter().sum();
@@ -207,7 +207,7 @@ impl Collector<'_> {
     }
 }
 
-/// Adds the stages of totals; returns where they are, and the slip of contact points.
+/// Adds the stages of totals; returns their places, and the slip of contact points.
 pub(super) fn add(b: &mut Builder, p: &Parts) -> (Totals, [Option<Buffer>; 2]) {
     let Parts { tables, nodes, hexes, beams, bends, .. } = p;
     let buffer = b.scratch("totals", 0);

@@ -1,4 +1,4 @@
-//! What test rigs check alike: limits of a case, which load steps a rig takes, and whether yarns and threads of its fabric go together.
+//! Checks shared by the test rigs: limits of a case, permitted load steps, and compatibility of the yarns and threads of a fabric.
 
 use crate::case::fabric::{Fabric, Yarn};
 use crate::case::provenance::Provenance;
@@ -6,14 +6,14 @@ use crate::case::{Case, FabricSource};
 use crate::error::Result;
 use crate::settings::steps::Step;
 
-/// Most hexahedra of one case.
+/// Largest number of hexahedra of a case.
 pub const MAX_HEXES: f64 = 5e7;
-/// Most beams of one case.
+/// Largest number of beams of a case.
 pub const MAX_BEAMS: f64 = 1e7;
-/// Positions are held to ± this, mm.
+/// Coordinates are limited to ± this value, mm.
 pub const MAX_POSITION_MM: f64 = 250.0;
 
-/// Refuses a load step to which `refused` has an answer.
+/// Refuses every load step for which `refused` returns a reason.
 pub fn steps(case: &Case, provenance: &Provenance, refused: impl Fn(&Step) -> Option<&'static str>) -> Result<()> {
     for (i, step) in case.steps.iter().enumerate() {
         if let Some(message) = refused(step) {
@@ -23,7 +23,7 @@ pub fn steps(case: &Case, provenance: &Provenance, refused: impl Fn(&Step) -> Op
     Ok(())
 }
 
-/// The fabric of a case whose domain is a `what`.
+/// The fabric of a case; `what` names the domain in errors.
 pub fn fabric<'a>(case: &'a Case, what: &str, provenance: &Provenance) -> Result<&'a Fabric> {
     let Some(FabricSource::Inline(fabric)) = &case.fabric else {
         let message = format!("is missing, a {what} needs one: give a fabric file or the fabric itself");
@@ -49,7 +49,7 @@ fn yarn(name: &str, yarn: &Yarn, provenance: &Provenance) -> Result<()> {
     Ok(())
 }
 
-/// One thread, as thin as it starts, has to pass between two yarns of either ply.
+/// One thread at its initial thickness must pass between two yarns of either ply.
 fn threads(case: &Case, fabric: &Fabric, provenance: &Provenance) -> Result<()> {
     let Some(contact) = case.effects.contact.as_ref().filter(|contact| contact.thread_yarn) else { return Ok(()) };
     let (radius, ratio) = (fabric.stitch.radius_mm, contact.initial_radius_ratio);

@@ -1,5 +1,5 @@
-//! Crossings of warp and weft during a run: means in every row, all of them as a table and a map at every frame, and as maps in the
-//! report.
+//! Crossings of warp and weft during a run: means in every row, a table and a map of all crossings at every frame, and the maps
+//! of the report.
 
 use super::bias_extension::zones::{Means, Strip, Zone};
 use super::observer::Tables;
@@ -18,12 +18,13 @@ use crate::output::{map, vtu};
 use glam::{DVec2, DVec3, Vec3Swizzles};
 use std::path::Path;
 
-/// Means over a zone leave out what is closer to its border than this share of the width of the specimen.
+/// Zone means exclude crossings closer to the zone border than this share of the specimen width.
 pub(super) const MARGIN: f64 = 0.1;
-/// Share of the values at each end that the colours of several maps leave out: gaps at the edges of a specimen are no gaps.
+/// Share of the values at each end that the common colour range of several maps ignores: gaps at the edges of a specimen are
+/// not real gaps.
 const OUTER: f64 = 0.02;
 
-/// The crossings of a scene with their files.
+/// The crossings of a scene and their output files.
 pub(super) struct Crossed {
     crossings: Crossings,
     shear: Shear,
@@ -33,13 +34,13 @@ pub(super) struct Crossed {
     pub(super) maps: Vec<(f64, String)>,
 }
 
-/// `shear.csv`: that of a specimen has zones.
+/// `shear.csv`; a specimen adds the columns of the zones.
 enum Shear {
     Whole(Table<rows::Shear>),
     Zoned(Zones, Table<(rows::Shear, rows::Zones)>),
 }
 
-/// Zone of each crossing: of every one, and of those well inside.
+/// Zone of every crossing, and zone of the crossings well inside a zone.
 struct Zones {
     all: Vec<Zone>,
     core: Vec<Option<Zone>>,
@@ -58,8 +59,8 @@ impl Zones {
 }
 
 impl Crossed {
-    /// Opens the tables of a scene; `None` if it has no crossings. Positive shear turns yarns towards `diagonal`; the strip between
-    /// the clamps of a specimen has zones.
+    /// Opens the tables of a scene; `None` if it has no crossings. Positive shear turns the yarns towards `diagonal`. Zones
+    /// exist for the strip between the clamps of a specimen.
     pub(super) fn of(mesh: &Mesh, diagonal: DVec2, strip: Option<Strip>, tables: &Tables) -> Result<Option<Self>> {
         let crossings = Crossings::of(mesh, diagonal);
         if crossings.pairs.is_empty() {
@@ -81,7 +82,7 @@ impl Crossed {
         [shear, &mut self.each.file]
     }
 
-    /// Those of a specimen.
+    /// Zones of a specimen.
     fn zones(&self) -> Option<&Zones> {
         match &self.shear {
             Shear::Whole(_) => None,
@@ -98,8 +99,8 @@ impl Crossed {
         self.zones().map(|zones| Means::of(crossings, &zones.core))
     }
 
-    /// Means over all crossings, and over those of each zone; `state` is time, shear angle in degrees, and displacement,
-    /// `theory` the angle of zone C without slip, rad.
+    /// Writes the means over all crossings and over each zone. `state` is time, shear angle in degrees, and displacement;
+    /// `theory` is the no-slip angle of zone C, rad.
     pub(super) fn write_row(&mut self, state: [f64; 3], crossings: &[Crossing], theory: f64) -> Result<()> {
         let (angle, slip) = (angles(crossings.iter()), slips(crossings.iter()));
         let row = rows::Shear {
@@ -119,7 +120,7 @@ impl Crossed {
         }
     }
 
-    /// Every crossing of a frame: fields of hexahedra that follow from them, rows of the table, and a map in the folder of results.
+    /// Processes all crossings of a frame: derived fields of the hexahedra, rows of the table, and a map in the results folder.
     pub(super) fn frame(&mut self, mesh: &Mesh, frame: &mut Frame, dir: &Path, name: &str) -> Result<()> {
         let yarns = yarns::measure(mesh, frame)?;
         let crossings = self.crossings.measure(mesh, frame, &yarns)?;
@@ -167,7 +168,7 @@ impl Crossed {
                 weft_gap_mm: c.gap[1],
             })?;
         }
-        // yarns that cross no longer have no place on a map
+        // yarns that cross no longer are not on the map
         let there: Vec<usize> = (0..crossings.len()).filter(|&i| crossings[i].angle.is_finite()).collect();
         let points: Vec<[f64; 3]> = there.iter().map(|&i| crossings[i].position.to_array()).collect();
         let field = |name: &str, value: &dyn Fn(usize) -> f64| Field {
@@ -194,7 +195,7 @@ impl Crossed {
     }
 }
 
-/// Columns of the zones; `theory` is the angle of zone C without slip, rad.
+/// Columns of the zones; `theory` is the no-slip angle of zone C, rad.
 fn by_zone(means: &Means, theory: f64) -> rows::Zones {
     let [angle, spread] = [means.angle, means.angle_std].map(|zones| zones.map(f64::to_degrees));
     let direction = means.direction.map(f64::to_degrees);
@@ -220,7 +221,7 @@ fn by_zone(means: &Means, theory: f64) -> rows::Zones {
     }
 }
 
-/// Maps of the crossings in a report: at the last of the loaded frames, or at some of them, evenly chosen, in colours of one range.
+/// Maps of the crossings in a report, at the last loaded frame or at evenly spaced frames, with a common colour range.
 pub(super) fn maps(results: &Results, page: &mut Page, most: usize) -> Result<()> {
     let Some(table) = results.other("crossings.csv")?.filter(|t| !t.is_empty()) else { return Ok(()) };
     let crossings: Vec<rows::Crossing> = table.rows()?;
@@ -259,7 +260,7 @@ pub(super) fn maps(results: &Results, page: &mut Page, most: usize) -> Result<()
     Ok(())
 }
 
-/// Range of values without the outermost at both ends; `None` if there is none.
+/// Range of values without the outliers at both ends; `None` if empty.
 fn middle(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
     values.sort_by(f64::total_cmp);

@@ -1,7 +1,7 @@
-//! Test rigs: what a piece of fabric is held and loaded by, what is measured on it, and what its curves are drawn over.
+//! Test rigs: how a piece of fabric is held and loaded, what is measured, and the abscissa of its curves.
 //!
-//! A rig is a folder here, and the description of its piece of fabric in [`crate::case::domain`]. Nothing else of the program asks
-//! which rig a case has: [`of`] is the only place that does.
+//! A rig is a folder here plus the description of its domain in [`crate::case::domain`]. [`of`] is the only place in the
+//! program that distinguishes the rigs.
 
 pub mod bias_extension;
 pub mod cell;
@@ -24,45 +24,45 @@ use crate::scene::{Motion, Scene, Tie};
 use crate::simulate::Simulation;
 use observer::{Observer, Tables};
 
-/// A test rig with the sizes that a case gives it.
+/// A test rig with the dimensions given by a case.
 pub trait Rig {
-    /// Whether sizes, load steps and resolution of a case go together.
+    /// Checks that dimensions, load steps and resolution of a case are consistent.
     ///
     /// # Errors
     /// The first contradiction, by its JSON path.
     fn check(&self, case: &Case, provenance: &Provenance) -> Result<()>;
 
-    /// The piece of fabric, what moves it, and where its threads are tied.
+    /// Builds the piece of fabric, its prescribed motion, and the ties of its threads.
     ///
     /// # Errors
     /// Geometry that cannot be meshed.
     fn piece(&self, case: &Case) -> Result<Piece>;
 
-    /// What is measured during a run.
+    /// The observer that measures during a run.
     ///
     /// # Errors
     /// A table that cannot be opened.
     fn observer(&self, case: &Case, simulation: &Simulation, tables: &Tables) -> Result<Box<dyn Observer>>;
 
-    /// Curves of a report.
+    /// The curves of a report.
     ///
     /// # Errors
     /// A table of the run that cannot be read.
     fn curves(&self, results: &Results, page: &mut Page) -> Result<()>;
 
-    /// Sections of a report behind its curves; returns what they say in sentences.
+    /// The report sections that follow the curves; returns their findings as sentences.
     ///
     /// # Errors
     /// Files of the run that cannot be read.
     fn sections(&self, case: &Case, results: &Results, page: &mut Page) -> Result<Vec<String>>;
 
-    /// Columns of the history that state what the curves are drawn over and the force.
+    /// History columns of the abscissa and of the force.
     fn columns(&self, results: &Results) -> Vec<&'static str>;
 
-    /// Lets the ends of cut threads slide.
+    /// Frees the ends of cut threads.
     fn free_thread_ends(&mut self) {}
 
-    /// Takes the thermal strain out of threads that are not of a fabric.
+    /// Removes the thermal strain of threads that do not belong to a fabric.
     fn relax_threads(&mut self) {}
 }
 
@@ -83,7 +83,7 @@ pub fn of(domain: &Domain) -> &dyn Rig {
     }
 }
 
-/// The rig of a case, to be changed.
+/// The rig of a case, mutable.
 pub fn of_mut(domain: &mut Domain) -> &mut dyn Rig {
     match domain {
         Domain::Cell(cell) => cell,
@@ -95,7 +95,7 @@ pub fn of_mut(domain: &mut Domain) -> &mut dyn Rig {
 /// The scene of a case.
 ///
 /// # Errors
-/// Geometry that cannot be meshed, or that reaches farther than positions do.
+/// Geometry that cannot be meshed, or that exceeds the range of positions.
 pub fn scene(case: &Case) -> Result<Scene> {
     let Piece { mesh, motions, ties } = of(&case.domain).piece(case)?;
     let shift = centre::shift(&mesh);

@@ -1,4 +1,4 @@
-//! What a rig measures while a scene runs.
+//! The observer interface: what a rig measures while a scene runs.
 
 use crate::error::Result;
 use crate::kernel::record::Record;
@@ -12,15 +12,15 @@ use serde::Serialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// The folder of a run, in which tables are begun, or gone on with.
+/// The folder of a run, in which tables are created or continued.
 pub struct Tables {
     pub dir: PathBuf,
-    /// Whether the run goes on from a checkpoint: its tables are there.
+    /// Whether the run resumes from a checkpoint, so that its tables exist.
     pub goes_on: bool,
 }
 
 impl Tables {
-    /// A table by its file name.
+    /// Opens a table by its file name.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -29,7 +29,7 @@ impl Tables {
         if self.goes_on { Table::open(&path) } else { Table::create(&path) }
     }
 
-    /// A table whose columns depend on the scene.
+    /// Opens a table whose columns depend on the scene.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -39,36 +39,36 @@ impl Tables {
     }
 }
 
-/// What is seen at a row of the tables.
+/// The state of a scene at a row of the tables.
 pub struct Seen<'a> {
     /// Name of the load step.
     pub phase: &'a str,
-    /// The deformed state, and the sizes of yarns in it; nothing where the scene does not have both plies.
+    /// The deformed state and its yarn sizes; `None` unless the scene has both plies.
     pub yarns: Option<(&'a Frame, &'a [Yarn])>,
-    /// Force of the machine from the reactions of all prescribed nodes, N.
+    /// Machine force from the reactions of all prescribed nodes, N.
     pub machine: f64,
 }
 
-/// Angle and forces of a row of the history.
+/// Shear angle and forces of a history row.
 #[derive(Debug, Clone, Copy)]
 pub struct Loading {
     /// Shear angle, degrees.
     pub degrees: f64,
-    /// N.
+    /// Machine force, N.
     pub force: f64,
-    /// F_nor, N/mm; not a number where it has no meaning.
+    /// F_nor, N/mm; NaN where it is undefined.
     pub normalised: f64,
 }
 
-/// Measures of a rig, and the tables and files that only it has. A rig says only what it adds to what every run has.
+/// Measures, tables and files that are specific to a rig; everything common to all runs is written elsewhere.
 pub trait Observer {
-    /// A row of the rig's own tables.
+    /// Writes a row of the rig's own tables.
     ///
     /// # Errors
     /// A state that cannot be measured, or a table that cannot be written.
     fn row(&mut self, simulation: &mut Simulation, seen: &Seen) -> Result<Loading>;
 
-    /// Goes on from a state that another run left behind some load steps.
+    /// Starts from a state that another run left after some load steps.
     ///
     /// # Errors
     /// A state that cannot be measured.
@@ -76,7 +76,7 @@ pub trait Observer {
         Ok(())
     }
 
-    /// The end of a load step.
+    /// Handles the end of a load step.
     ///
     /// # Errors
     /// A state that cannot be measured.
@@ -84,7 +84,7 @@ pub trait Observer {
         Ok(())
     }
 
-    /// A frame about to be written: adds its fields, and writes what lies beside it under a name in `frames/`.
+    /// Handles a frame before it is written: adds fields, and writes companion files under the given name in `frames/`.
     ///
     /// # Errors
     /// A state that cannot be measured, or a file that cannot be written.
@@ -92,17 +92,17 @@ pub trait Observer {
         Ok(())
     }
 
-    /// Whether inertia is judged now: the scene is loaded, and its motion has settled since that began.
+    /// Whether inertia is judged now: the scene is loaded, and the transient at the start of loading has decayed.
     fn is_loaded(&self, _simulation: &Simulation, _phase: &str) -> bool {
         false
     }
 
-    /// Files of its tables, always in the same order.
+    /// Files of the rig's tables, always in the same order.
     fn tables(&mut self) -> Vec<&mut Appended> {
         Vec::new()
     }
 
-    /// What it carries from row to row.
+    /// Saves or restores the data carried from row to row.
     fn record(&mut self, _record: &mut Record) {}
 
     /// Fields of the summary.
@@ -110,7 +110,7 @@ pub trait Observer {
         Vec::new()
     }
 
-    /// Lines for a person at the end of a run.
+    /// Closing lines for the user.
     fn lines(&self, _simulation: &Simulation) -> String {
         String::new()
     }

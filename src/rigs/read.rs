@@ -1,4 +1,4 @@
-//! From a case file and the command line to a typed case whose every number has been checked.
+//! Reads a case file and command-line overrides into a typed case with every number checked.
 
 use crate::case::accuracy::{Accuracy, fill};
 use crate::case::overrides::Override;
@@ -10,19 +10,19 @@ use crate::error::{Error, Result};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// A case that was read and checked.
+/// A case that has been read and checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loaded {
-    /// The case, its fabric inline.
+    /// The case, with its fabric inline.
     pub case: Case,
-    /// Everything that was not written: JSON path and value, by default or by the accuracy that was asked for.
+    /// JSON path and value of everything not written in the case: defaults, and values implied by the requested accuracy.
     pub defaults: Vec<(String, Value)>,
-    /// Where the parts were written; makes errors that name their file.
+    /// Sources of the parts, so that errors name their file.
     pub provenance: Provenance,
 }
 
-/// Reads a case file, loads the fabric file it names (relative to the case), applies `path=value` overrides in order,
-/// and checks everything that can be checked without a mesh.
+/// Reads a case file, loads the fabric file it names (relative to the case), applies `path=value` overrides in order, and
+/// performs all checks that need no mesh.
 pub fn read(path: &Path, overrides: &[String]) -> Result<Loaded> {
     let mut provenance = Provenance { case: path.into(), ..Provenance::default() };
     let schema = schema::case();
@@ -41,7 +41,7 @@ pub fn read(path: &Path, overrides: &[String]) -> Result<Loaded> {
     checked(value, provenance)
 }
 
-/// A case from a JSON value that holds its fabric, checked as if it were a file.
+/// Checks a JSON value with inline fabric as if it were a case file.
 ///
 /// # Errors
 /// The first fault, by its JSON path.
@@ -49,7 +49,7 @@ pub fn read_value(value: Value) -> Result<Case> {
     checked(value, Provenance { case: "case".into(), ..Provenance::default() }).map(|loaded| loaded.case)
 }
 
-/// The case in a value whose overrides have been applied.
+/// The typed case of a value with all overrides applied.
 fn checked(mut value: Value, provenance: Provenance) -> Result<Loaded> {
     if ["domain", "steps"].iter().all(|name| value.get(name).is_none()) && value.get("stitch").is_some() {
         let message = "this is a fabric, not a case: give a case that names it in its field `fabric`";

@@ -1,4 +1,5 @@
-//! A look at a case before it is run: sizes, effects, expected time, and on request what each effect costs and the whole algorithm.
+//! Checks a case before it runs: sizes, effects, expected time and, on request, the cost of each effect and the stages of the
+//! algorithm.
 
 use super::effects::{Effect, effects};
 use super::interleaved_timing::{Ratio, ratio, step_time, trial, wall};
@@ -9,19 +10,19 @@ use crate::rigs::read::Loaded;
 use crate::simulate::{BackendConfig, Simulation};
 use std::fmt::Write as _;
 
-/// Seconds of the turns that the share of an effect is measured in, at most, and how many turns there are.
+/// Longest duration of a turn when the share of an effect is measured, s, and the number of turns.
 const TURNS_S: f64 = 1.0;
 const TURNS: usize = 7;
 
-/// Sizes and cost of a case; with `explain` what called for each effect and what it costs, every stage of the plan, and the
-/// defaults in use.
+/// Sizes and cost of a case; with `explain` also the cause and cost of each effect, every stage of the plan, and the defaults
+/// in use.
 pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
     let mut probe = simulation(loaded, BackendConfig::default())?;
     probes::nodes(&loaded.case.output.probes, probe.mesh())?;
     let bytes: usize = probe.model.plan.buffers.iter().map(|b| 4 * b.len).sum();
     probe.advance(0.0, |_| false)?;
     let (dt, end) = (probe.dt(), probe.schedule.end());
-    // a few steps for the expected time; the first burst warms up
+    // a few steps to estimate the run time; the first burst is a warm-up
     probe.advance(16.0 * dt, |_| false)?;
     let before = probe.timings();
     let per_step = step_time(&mut probe, 64, wall)?;
@@ -94,7 +95,7 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
     Ok(t)
 }
 
-/// Names and seconds of stages since an earlier look.
+/// Names and seconds of the stages since an earlier reading.
 fn since(before: &[(&'static str, f64)], now: Vec<(&'static str, f64)>) -> Vec<(&'static str, f64)> {
     let old = |name| before.iter().find(|(known, _)| *known == name).map_or(0.0, |(_, seconds)| *seconds);
     now.into_iter().map(|(name, seconds)| (name, seconds - old(name))).collect()
@@ -107,8 +108,8 @@ fn begun(loaded: &Loaded) -> Result<Simulation> {
     Ok(simulation)
 }
 
-/// What called for each effect, and its share of the time of all stages: of those that are there for it alone, or, where it is
-/// part of stages that others share, by trials without it.
+/// Cause of each effect and its share of the time of all stages: the time of its own stages or, where it shares stages with
+/// other effects, from trials without it.
 fn costs(
     t: &mut String,
     loaded: &Loaded,

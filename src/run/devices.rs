@@ -3,7 +3,7 @@
 use crate::backend::gpu;
 use std::fmt::Write as _;
 
-/// One paragraph an adapter, the one that `--backend gpu` takes first.
+/// One paragraph per adapter, starting with the default of `--backend gpu`.
 pub fn devices() -> String {
     let mib = |bytes: u64| bytes / (1 << 20);
     let mut text = String::new();

@@ -1,4 +1,4 @@
-//! The effects of a scene by name: what called for each, which stages are there for it alone, and the case without it.
+//! The effects of a scene by name: cause, exclusive stages, and the case without the effect.
 
 use crate::case::FabricSource;
 use crate::contact::EMPTY;
@@ -12,11 +12,11 @@ use crate::simulate::Simulation;
 /// An effect that a scene has.
 pub struct Effect {
     pub name: &'static str,
-    /// The field of the case that asks for it, or what implies it.
+    /// The field of the case that requests it, or what implies it.
     pub cause: String,
-    /// Stages that are there for it alone.
+    /// Stages that exist for this effect alone.
     pub stages: &'static [&'static str],
-    /// Takes it out of a case; `None` where it is what the case describes.
+    /// Removes it from a case; `None` if it cannot be turned off.
     pub off: Option<Off>,
 }
 
@@ -48,7 +48,7 @@ pub fn effects(loaded: &Loaded, simulation: &Simulation) -> Vec<Effect> {
     found.effects
 }
 
-/// Takes an effect out of a case.
+/// Removes an effect from a case.
 type Off = fn(&mut Loaded);
 
 /// The effects found so far.
@@ -63,7 +63,7 @@ impl Found<'_> {
         self.effects.push(Effect { name, cause, stages, off });
     }
 
-    /// The path of a field, and whether it was written or is there by default.
+    /// The path of a field, and whether it was written or is a default.
     fn written(&self, path: &str) -> String {
         let inside = |a: &str, b: &str| a.strip_prefix(b).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
         let covers = |default: &str| inside(default, path) || inside(path, default);
@@ -130,7 +130,7 @@ impl Found<'_> {
         }
     }
 
-    /// What bodies do by themselves, and gravity.
+    /// Effects inside bodies, and gravity.
     fn bodies(&mut self) {
         let active = self.simulation.model.active;
         let thread = |of: fn(&Thread) -> f64| {
@@ -162,7 +162,7 @@ impl Found<'_> {
         }
     }
 
-    /// What makes steps long.
+    /// Effects that lengthen the time step.
     fn numerics(&mut self) {
         let model = &self.simulation.model;
         if model.active.fibre_lines {
@@ -184,7 +184,7 @@ impl Found<'_> {
         }
     }
 
-    /// What the case describes, and what is there in any case.
+    /// Effects that follow from the domain of the case, and effects of every scene.
     fn scene(&mut self) {
         if self.simulation.model.active.periodic {
             self.add("periodicity", "domain.cell".into(), &["total kinetic energy"], None);
@@ -201,7 +201,7 @@ impl Found<'_> {
     }
 }
 
-/// Names of what prescribes motion, the first few.
+/// Names of the first few prescribed motions.
 fn grips(simulation: &Simulation) -> String {
     const FEW: usize = 3;
     let motions = &simulation.scene.motions;
@@ -210,7 +210,7 @@ fn grips(simulation: &Simulation) -> String {
     names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
 }
 
-/// Beams and nodes of yarns that have another yarn within reach, and pairs of beams within reach of each other.
+/// Numbers of beams near yarns, of yarn nodes near other yarns, and of pairs of beams near each other.
 fn near(simulation: &Simulation) -> [usize; 3] {
     let buffers = &simulation.model.buffers;
     let entries = |buffer| simulation.backend().uints(buffer);

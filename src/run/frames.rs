@@ -1,4 +1,4 @@
-//! The frames of a run, and pictures of them.
+//! The frames of a run, and their pictures.
 
 use super::picture::draw;
 use super::session::Run;

@@ -1,4 +1,4 @@
-//! Forces of grips in every row: `reactions.csv`, and the force of the machine of a scene with conditions.
+//! Forces of the grips in every row of `reactions.csv`, and the machine force of a scene with conditions.
 
 use crate::error::Result;
 use crate::output::rows::Reaction;
@@ -10,14 +10,14 @@ use crate::simulate::Simulation;
 /// The grips of a scene.
 pub(super) struct Grips {
     grips: Vec<Motion>,
-    /// Prescribed nodes of each grip, by their place in the list of reactions, with the components that count as its own: what two
-    /// grips prescribe belongs to the first.
+    /// Prescribed nodes of each grip, by index into the list of reactions, with the components that it owns: a component
+    /// prescribed by two grips belongs to the first.
     own: Vec<Vec<(usize, [bool; 3])>>,
     pub(super) table: Table<Reaction>,
 }
 
 impl Grips {
-    /// Those of a simulation; `None` if nothing is prescribed.
+    /// The grips of a simulation; `None` if nothing is prescribed.
     pub(super) fn of(simulation: &Simulation, tables: &Tables) -> Result<Option<Self>> {
         let grips = simulation.scene.motions.clone();
         if grips.is_empty() {
@@ -38,7 +38,7 @@ impl Grips {
         Ok(Some(Self { grips, own, table: tables.open("reactions.csv")? }))
     }
 
-    /// Force of each grip on the scene, N: what balances the forces of the scene on its prescribed components.
+    /// Force of each grip on the scene, N: it balances the forces of the scene on the prescribed components.
     fn forces(&self, reactions: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let sum = |own: &Vec<(usize, [bool; 3])>| {
             let mut sum = [0.0; 3];
@@ -50,8 +50,8 @@ impl Grips {
         self.own.iter().map(sum).collect()
     }
 
-    /// A row for each grip. Returns the force of the machine, N: the one that does the work of all grips on the largest displacement
-    /// among them, or where none moves, the size of what they all hold.
+    /// Writes a row for each grip. Returns the machine force, N: the force that does the work of all grips over the largest
+    /// grip displacement or, if no grip moves, the magnitude of all holding forces.
     pub(super) fn write(&mut self, simulation: &Simulation) -> Result<f64> {
         let reactions = simulation.reactions();
         simulation.alive()?;

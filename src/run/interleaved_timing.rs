@@ -1,5 +1,5 @@
-//! Times of the step of scenes, taken in turns: whatever else the machine does meets the scenes that are compared alike. On the
-//! CPU a trial has one thread, and what counts is how long that has run, not how long it has waited for a core.
+//! Interleaved timing of steps: scenes run in turns, so that other load on the machine affects all compared scenes alike. On
+//! the CPU a trial has one thread and counts its CPU time, which excludes waiting for a core.
 
 use super::clock;
 use crate::error::Error;
@@ -7,12 +7,12 @@ use crate::simulate::{BackendConfig, Simulation};
 use std::sync::LazyLock;
 use std::time::Instant;
 
-/// The machine for a trial: one thread of the CPU, or the device.
+/// The backend of a trial: one CPU thread, or the device.
 pub fn trial(config: &BackendConfig) -> BackendConfig {
     BackendConfig { threads: 1, ..config.clone() }
 }
 
-/// Time of a step of a scene over that of another: median over the turns, and half of the distance between their quartiles.
+/// Ratio of the step times of two scenes: median over the turns, and half the interquartile range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ratio {
     pub median: f64,
@@ -20,7 +20,7 @@ pub struct Ratio {
 }
 
 impl Ratio {
-    /// Of a list of ratios; not a number for none.
+    /// Ratio from a list of samples; NaN if the list is empty.
     fn of(mut ratios: Vec<f64>) -> Self {
         ratios.sort_by(f64::total_cmp);
         let at = |share: f64| {
@@ -33,15 +33,15 @@ impl Ratio {
     }
 }
 
-/// Advances two scenes on the machine of a [`trial`] by about `steps` steps each, `rounds` times, the one that begins taking turns. A scene that a guard stops
-/// takes no further turns.
+/// Advances two scenes on the backend of a [`trial`] by about `steps` steps each, `rounds` times, in alternating order. A scene
+/// that a guard stops takes no further turns.
 ///
 /// # Errors
 /// A device that failed.
 pub fn ratio(scene: &mut Simulation, beside: &mut Simulation, steps: u64, rounds: usize) -> Result<Ratio, Error> {
     let clock = if scene.on_device() { wall } else { ran };
     let mut ratios = Vec::with_capacity(rounds);
-    // the first round warms up
+    // the first round is a warm-up
     for round in 0..=rounds {
         let pair = [&mut *scene, &mut *beside];
         let mut times = [0.0; 2];
@@ -63,20 +63,20 @@ pub fn ratio(scene: &mut Simulation, beside: &mut Simulation, steps: u64, rounds
     Ok(Ratio::of(ratios))
 }
 
-/// Seconds of a step by a clock, over about `steps` steps.
+/// Time per step by a clock, s, over about `steps` steps.
 pub(super) fn step_time(scene: &mut Simulation, steps: u64, clock: impl Fn() -> f64) -> Result<f64, Error> {
     let (before, started) = (scene.step(), clock());
     scene.advance(scene.time() + steps as f64 * scene.dt(), |_| false)?;
     Ok((clock() - started) / (scene.step() - before).max(1) as f64)
 }
 
-/// Seconds of wall time, from a moment on.
+/// Wall time since a fixed moment, s.
 pub(super) fn wall() -> f64 {
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
     START.elapsed().as_secs_f64()
 }
 
-/// Seconds that this thread has run; wall time where the system does not tell.
+/// CPU time of this thread, s; wall time where the system does not provide it.
 fn ran() -> f64 {
     clock::thread().unwrap_or_else(wall)
 }

@@ -1,4 +1,4 @@
-//! The load steps of a run, row by row, with frames and checkpoints on the way.
+//! The load steps of a run, row by row, with the frames and checkpoints due in between.
 
 use super::session::{Place, Run};
 use crate::error::Result;
@@ -9,7 +9,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 impl Run<'_> {
-    /// All load steps, or those that are left.
+    /// Runs all load steps, or those that remain.
     pub(super) fn load_steps(&mut self, watch: &mut dyn FnMut() -> Duration) -> Result<()> {
         let output = &self.loaded.case.output;
         let phases = self.simulation.schedule.phases().to_vec();
@@ -30,7 +30,7 @@ impl Run<'_> {
             let rows = output.rows_per_step.max(1);
             let time = |row: usize| phase.start + (phase.end - phase.start) * row as f64 / rows as f64;
             let schedule = self.simulation.schedule.clone();
-            // of angle and displacement one does not change on the way
+            // in a load step only one of angle and displacement changes
             let way = |row: usize| {
                 let load = schedule.load(time(row));
                 load.angle.to_degrees() + load.motion * reach
@@ -39,7 +39,7 @@ impl Run<'_> {
             for row in self.place.row + 1..=rows {
                 let steps = self.simulation.step();
                 let arrived = self.reach(time(row))?;
-                // where there are more rows than time steps
+                // there may be more rows than time steps
                 if self.simulation.step() > steps {
                     self.write_row(phase.name)?;
                 }
@@ -83,7 +83,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Goes on to a time, with checkpoints on the way; false if the user stopped it before.
+    /// Advances to a time and writes the checkpoints due in between; false if the user stopped the run earlier.
     pub(super) fn reach(&mut self, until: f64) -> Result<bool> {
         loop {
             let (stopped, due) = (Arc::clone(&self.stopped), self.due);
@@ -101,8 +101,8 @@ impl Run<'_> {
     }
 }
 
-/// Shear angles, degrees, or displacements, mm, on a way from one to another where a frame is due: `marks`, whatever their sign. A
-/// load step has frames of its own where it starts and ends.
+/// Shear angles, degrees, or displacements, mm, between the `ends` at which a frame is due: `marks` of either sign. Both ends
+/// of a load step already have frames.
 fn places(marks: &[f64], ends: [f64; 2]) -> Vec<f64> {
     /// Rounding of an angle.
     const SAME: f64 = 1e-9;

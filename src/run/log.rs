@@ -1,11 +1,11 @@
-//! `run.log`: what a run did and when, line by line, for who looks at it from outside. It is added to whenever the run goes on.
+//! `run.log`: what a run did and when, line by line, for outside observers. A resumed run appends to it.
 
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-/// Name of the file in a folder of results.
+/// Name of the log file in a results folder.
 pub const NAME: &str = "run.log";
 
 /// The log of a run.
@@ -15,12 +15,12 @@ pub struct Log {
 }
 
 impl Log {
-    /// That of a folder of results.
+    /// The log in a results folder.
     pub fn of(dir: &Path) -> Self {
         Self { path: dir.join(NAME) }
     }
 
-    /// Adds a line with the time of day. A log that cannot be written does not stop a run.
+    /// Adds a line with the time of day. A failure to write the log does not stop a run.
     pub fn add(&self, line: &str) {
         let time = humantime::format_rfc3339_seconds(SystemTime::now());
         let file = File::options().create(true).append(true).open(&self.path);

@@ -11,8 +11,8 @@ use crate::rigs::read::Loaded;
 use crate::scene::Scene;
 use std::path::Path;
 
-/// Writes the mesh of a case to a folder: VTU and Abaqus input; returns its report. A folder that holds anything is refused, or with
-/// `force` what a run or mesh left there is moved aside.
+/// Writes the mesh of a case to a folder as VTU and Abaqus input; returns a report. A folder that is not empty is refused; with
+/// `force`, files left there by a run or mesh are moved aside.
 ///
 /// # Errors
 /// Geometry that cannot be meshed, or a folder that cannot be used.

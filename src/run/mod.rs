@@ -1,4 +1,4 @@
-//! Case in, results out: owns the plan, the backend, the schedule, the measures and the outputs of one run.
+//! Runs one case: owns the plan, the backend, the schedule, the measures and the outputs of the run.
 
 #![warn(clippy::too_many_lines)]
 
@@ -43,36 +43,36 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// The case in a folder of results, with every default written out.
+/// The case with all defaults written out, in a results folder.
 pub const CASE: &str = "case.json";
 
-/// The verdict of a run that has come to its end.
+/// The verdict of a completed run.
 const FINISHED: &str = "finished";
 
-/// What the command line says about a run, beyond the case.
+/// Command-line options of a run, beyond the case.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Folder of the results.
     pub output: PathBuf,
-    /// Scalar type; `None` as the case says.
+    /// Scalar type; `None` to follow the case.
     pub precision: Option<Precision>,
     /// Number of threads; `None` for all cores.
     pub threads: Option<usize>,
-    /// What the scene runs on.
+    /// The machine that runs the scene.
     pub machine: Machine,
     /// Part of the name of the adapter; empty for any.
     pub adapter: String,
     /// Move earlier results in the folder aside.
     pub force: bool,
-    /// Go on from the last checkpoint in the folder.
+    /// Resume from the last checkpoint in the folder.
     pub resume: bool,
     /// Start from a checkpoint that another run left at the end of a load step.
     pub from: Option<PathBuf>,
-    /// No progress.
+    /// No progress display.
     pub quiet: bool,
 }
 
-/// What a scene runs on.
+/// The machine that runs a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Machine {
     /// A discrete GPU if there is one and the scene is in f32, else the CPU.
@@ -81,10 +81,10 @@ pub enum Machine {
     Gpu,
 }
 
-/// The machine that was asked for, ready to make backends.
+/// Configuration of the requested machine, ready to make backends.
 ///
 /// # Errors
-/// No such machine here.
+/// The requested machine does not exist here.
 pub fn backend_config(
     precision: Precision,
     machine: Machine,
@@ -107,10 +107,10 @@ pub fn backend_config(
     Ok(BackendConfig { precision, threads: threads.unwrap_or(0), device, ..BackendConfig::default() })
 }
 
-/// What a run found, in a dozen lines.
+/// The findings of a run, in a dozen lines.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// The user stopped the run; results so far are complete files.
+    /// The user stopped the run; the files written so far are complete.
     pub interrupted: bool,
     /// The lines.
     pub text: String,
@@ -122,12 +122,12 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// Writes the case, its fabric inline, so that a folder of results can be drawn and run again by itself.
+/// Writes the case with its fabric inline, so that a results folder is sufficient to draw and repeat the run.
 fn write_case(case: &Case, dir: &Path) -> Result<()> {
     file::replace(&dir.join(CASE), |w| serde_json::to_writer_pretty(w, case).map_err(Into::into))
 }
 
-/// Prepares a case for running, without files.
+/// Prepares a case for running, without output files.
 pub fn simulation(loaded: &Loaded, config: BackendConfig) -> Result<Simulation> {
     Simulation::new(rigs::scene(&loaded.case)?, config)
 }
@@ -146,13 +146,13 @@ pub fn simulation_at(loaded: &Loaded, config: BackendConfig, state: &Path) -> Re
 /// Runs a case.
 ///
 /// # Errors
-/// Bad input, a folder that cannot be used, a guard that stopped the run, or a device that failed; what was computed by then
-/// stays on disk.
+/// Bad input, a folder that cannot be used, a guard that stopped the run, or a device that failed; results computed so far stay
+/// on disk.
 pub fn run(loaded: &Loaded, options: &Options) -> Result<Outcome> {
     run_watched(loaded, options, &mut || Duration::ZERO)
 }
 
-/// Runs a case on a machine that is ready, whatever the options say of it.
+/// Runs a case on a prepared machine, which overrides the options.
 ///
 /// # Errors
 /// As of [`run`].
@@ -160,7 +160,7 @@ pub fn run_on(loaded: &Loaded, options: &Options, config: BackendConfig) -> Resu
     drive(loaded, options, config, &mut || Duration::ZERO)
 }
 
-/// Runs a case and calls `watch` behind every row of the tables; the time that it says to have taken does not count.
+/// Runs a case and calls `watch` after every row of the tables; the duration that `watch` returns is excluded from the wall time.
 ///
 /// # Errors
 /// As of [`run`].

@@ -1,4 +1,4 @@
-//! What a user should know about a case that is valid all the same.
+//! Notes on a valid case that the user should know.
 
 use crate::mesh::{Mesh, Ply};
 use crate::rigs::read::Loaded;
@@ -6,11 +6,11 @@ use crate::settings::integration::Hexahedra;
 use crate::settings::material::Material;
 use crate::settings::steps::Step;
 
-/// Poisson's ratio above which hexahedra with eight points of integration lock so much that a slender beam of them bends visibly less
-/// than one of hexahedra with one point.
+/// Poisson's ratio above which hexahedra with eight Gauss points lock: a slender beam of them bends visibly less than a beam of
+/// hexahedra with one Gauss point.
 const LOCKS: f64 = 0.4;
 
-/// Sentences, each with what to do.
+/// Sentences, each with a recommendation.
 pub(super) fn notes(Loaded { case, .. }: &Loaded, mesh: &Mesh) -> Vec<String> {
     let mut found = Vec::new();
     let tightens = case.steps.iter().any(|step| matches!(step, Step::Pretension { .. }));
@@ -33,7 +33,7 @@ pub(super) fn notes(Loaded { case, .. }: &Loaded, mesh: &Mesh) -> Vec<String> {
     found
 }
 
-/// Plies, and blocks of their own, of a law whose hexahedra lock.
+/// Plies and free blocks whose material law makes their hexahedra lock.
 fn locking(mesh: &Mesh) -> Vec<&str> {
     let locks = |material: &Material| matches!(material, Material::NeoHookean { poisson, .. } if *poisson > LOCKS);
     let mut names: Vec<&str> = Vec::new();

@@ -1,6 +1,6 @@
-//! Pictures of frames: while a run writes them, and of frames that are on disk already.
+//! Pictures of frames, during a run or from frames on disk.
 //!
-//! A frame on disk is drawn with the mesh of its case, which every folder of results holds as `case.json`.
+//! A frame on disk is drawn with the mesh of its case, which every results folder contains as `case.json`.
 
 use super::CASE;
 use crate::error::{Error, Result};
@@ -12,10 +12,11 @@ use crate::rigs;
 use crate::rigs::read::read;
 use std::path::{Path, PathBuf};
 
-/// Draws a frame (`.vtu`), or one of the folder of a run or mesh, to a PNG: the one whose number or name is `frame`, or the last.
+/// Draws a frame (`.vtu`), or a frame from the folder of a run or mesh, to a PNG: the frame with the number or name `frame`, or
+/// the last.
 ///
 /// # Errors
-/// Names the file that is missing or cannot be read, or the frames and fields that could be drawn instead.
+/// Names the missing or unreadable file, or lists the frames and fields that can be drawn.
 pub fn picture(source: &Path, frame: Option<&str>, view: &View, out: &Path) -> Result<String> {
     if !out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
         return Err(Error::file(out, "pictures are written as PNG: give a name that ends with .png"));
@@ -43,7 +44,7 @@ pub fn picture(source: &Path, frame: Option<&str>, view: &View, out: &Path) -> R
     Ok(format!("{} drawn as {}{replaced}", path.display(), out.display()))
 }
 
-/// A frame in the collection of a run, or the mesh of a folder that holds no run.
+/// A frame from the collection of a run, or the mesh if the folder holds no run.
 fn frame_of(dir: &Path, wanted: Option<&str>) -> Result<PathBuf> {
     let (collection, mesh) = (dir.join("run.pvd"), dir.join("mesh.vtu"));
     if !collection.exists() && mesh.exists() && wanted.is_none() {

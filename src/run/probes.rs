@@ -1,4 +1,4 @@
-//! Displacements of places that the case names, in every row of `probes.csv`.
+//! Displacements of the probes that the case names, in every row of `probes.csv`.
 
 use crate::case::output::{Place, Probe};
 use crate::error::{Error, Result};
@@ -9,16 +9,16 @@ use crate::simulate::Simulation;
 
 /// The probes of a run.
 pub(super) struct Probes {
-    /// Nodes of each.
+    /// Nodes of each probe.
     nodes: Vec<Vec<usize>>,
     pub(super) table: Named,
 }
 
 impl Probes {
-    /// Those of a case; `None` without any.
+    /// The probes of a case; `None` if there are none.
     ///
     /// # Errors
-    /// Names a probe that is nowhere in the mesh.
+    /// Names a probe that lies outside the mesh.
     pub(super) fn of(probes: &[Probe], mesh: &Mesh, tables: &Tables) -> Result<Option<Self>> {
         if probes.is_empty() {
             return Ok(None);
@@ -30,7 +30,8 @@ impl Probes {
         Ok(Some(Self { nodes, table: tables.named("probes.csv", &names)? }))
     }
 
-    /// A row: mean displacement of the nodes of each probe from where they were given, with the deformation of the cell.
+    /// Writes a row: mean displacement of the nodes of each probe from their given positions, including the deformation of the
+    /// cell.
     pub(super) fn write(&mut self, simulation: &Simulation, degrees: f64) -> Result<()> {
         let (frame, reference) = (simulation.frame(), &simulation.mesh().nodes);
         simulation.alive()?;
@@ -48,7 +49,7 @@ impl Probes {
 /// Nodes of each probe.
 ///
 /// # Errors
-/// Names a probe that is nowhere in the mesh.
+/// Names a probe that lies outside the mesh.
 pub(super) fn nodes(probes: &[Probe], mesh: &Mesh) -> Result<Vec<Vec<usize>>> {
     let thread = |name: &str| {
         let found = mesh.threads.iter().find(|thread| thread.name == name);

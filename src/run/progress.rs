@@ -1,4 +1,4 @@
-//! How far a run has come, for those who wait for it.
+//! Progress of a run, for the waiting user.
 
 use super::session::Run;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
@@ -14,14 +14,14 @@ impl Run<'_> {
         ProgressBar::new(1_000_000).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
     }
 
-    /// Shows how far the run is: on a bar, or without a terminal by a line a minute, which is in `run.log` in any case.
+    /// Shows the progress on a bar or, without a terminal, as a line every minute; the line is written to `run.log` in either case.
     pub(super) fn tell(&mut self, bar: &ProgressBar, phase: &str) {
         const EVERY: Duration = Duration::from_secs(60);
         let s = &self.simulation;
         let e = s.energies();
         let done = s.time() / s.schedule.end();
         bar.set_position((done * 1e6) as u64);
-        // by steps of the present length: how fast the load moves differs from step to step
+        // in steps of the current length: the load rate differs between load steps
         let steps = (s.schedule.end() - s.time()) / s.dt();
         let each = (self.wall() - self.taken_up.1) / s.step().saturating_sub(self.taken_up.0).max(1) as f64;
         let left = HumanDuration(Duration::from_secs_f64((steps * each).clamp(0.0, 1e8)));
@@ -43,7 +43,7 @@ impl Run<'_> {
             let line = format!("{:.1} %, {:.0} s, {message}", 100.0 * done, self.wall());
             self.log.add(&line);
             if bar.is_hidden() && !self.options.quiet {
-                // a reader that has gone away does not stop a run
+                // a reader that has closed the pipe does not stop a run
                 let _ = writeln!(std::io::stderr(), "{line}");
             }
         }

@@ -1,5 +1,5 @@
-//! The results of a run on one page: what was run, warnings, sizes beside their targets, curves, maps and pictures. It is
-//! made from the files in the folder alone, so that a run that still goes on can be looked at too.
+//! The results of a run on one page: case, warnings, sizes compared with their targets, curves, maps and pictures. The page
+//! uses only the files in the folder, so an unfinished run can be inspected too.
 
 use super::{CASE, FINISHED};
 use crate::case::fabric::Measured;
@@ -13,12 +13,12 @@ use crate::rigs::{self, Rig};
 use serde_json::Value;
 use std::path::Path;
 
-/// Kinetic over internal energy, and error of the energy balance, above which a run deserves a second look.
+/// Ratio of kinetic to internal energy, and error of the energy balance, above which a run deserves a second look.
 const KINETIC: f64 = 0.05;
 const BALANCE: f64 = 0.02;
-/// Smallest det F below which the mesh deserves one.
+/// Smallest det F below which the mesh deserves a second look.
 const JACOBIAN: f64 = 0.1;
-/// Mass added by contact, as a share, above which inertia may count.
+/// Mass added by contact, as a share, above which inertia may matter.
 const ADDED: f64 = 0.1;
 /// Rows of the table of the curve.
 const ROWS: usize = 16;
@@ -64,7 +64,7 @@ pub fn report(dir: &Path, out: &Path) -> Result<String> {
     Ok(lines.join("\n"))
 }
 
-/// A run, and the rig that it was made in.
+/// A run with its test rig.
 struct Report<'a> {
     results: Results<'a>,
     rig: &'a dyn Rig,
@@ -121,7 +121,7 @@ impl Report<'_> {
         format!("{version}{commit}{place}{time}")
     }
 
-    /// What a reader should know before trusting the numbers.
+    /// Warnings to read before trusting the numbers.
     fn warnings(&self, verdict: &str) -> Vec<String> {
         let mut found = Vec::new();
         if verdict != FINISHED {
@@ -162,13 +162,13 @@ impl Report<'_> {
         found
     }
 
-    /// Pictures that are there, in the order of their frames.
+    /// Existing pictures, in the order of their frames.
     fn pictures(&self) -> Vec<&str> {
         let pictures = self.results.summary["pictures"].as_array().map_or(&[][..], Vec::as_slice);
         pictures.iter().filter_map(Value::as_str).filter(|name| self.results.dir.join(name).is_file()).collect()
     }
 
-    /// Sizes of yarns before shear and at the end, beside those of the real fabric where they are known.
+    /// Yarn sizes before shear and at the end, compared with the real fabric where it is known.
     fn sizes(&self, page: &mut Page) -> Result<()> {
         let Some(yarns) = self.results.other("yarns.csv")?.filter(|y| !y.is_empty()) else { return Ok(()) };
         let phases = self.results.history.texts("phase");
@@ -235,7 +235,7 @@ impl Report<'_> {
         Ok(())
     }
 
-    /// Rows of the history, evenly chosen, as they are written.
+    /// Evenly spaced rows of the history, verbatim.
     fn table(&self, page: &mut Page) {
         let axis = self.results.axis();
         let phases = self.results.history.texts("phase");

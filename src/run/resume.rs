@@ -1,4 +1,4 @@
-//! Checkpoints of a run: when they are written, and how a run goes on from one.
+//! Checkpoints of a run: when they are written, and how a run resumes from one.
 
 use super::session::{Place, Run};
 use super::{CASE, FINISHED, Options};
@@ -18,18 +18,18 @@ use std::time::{Duration, Instant};
 pub(super) enum Start {
     /// At rest.
     New,
-    /// At rest, in a folder where this run was stopped before its first checkpoint.
+    /// At rest, in a folder where this run stopped before its first checkpoint.
     Again,
-    /// Nowhere: this run is finished.
+    /// Not at all: this run is finished.
     Finished,
-    /// At the end of so many load steps of another run.
+    /// After this number of load steps of another run.
     From(usize),
-    /// Where this run was when it wrote its last checkpoint: the record of the run.
+    /// At the last checkpoint of this run; holds the record of the run.
     Resumed(Vec<u8>),
 }
 
 impl Start {
-    /// What the options ask for; the simulation is then in that state. Nothing on disk is changed.
+    /// Determines the requested start and brings the simulation into that state. Nothing on disk is changed.
     pub(super) fn of(case: &Case, options: &Options, simulation: &mut Simulation) -> Result<Self> {
         let path = match &options.from {
             Some(path) => path.clone(),
@@ -64,11 +64,11 @@ impl Start {
     }
 }
 
-/// How a run begins that is to go on, but has no checkpoint.
+/// Start of a run that is to resume but has no checkpoint.
 fn without_checkpoint(case: &Case, dir: &Path) -> Result<Start> {
     let known = dir.join(CASE);
     if !known.is_file() {
-        // whether there are files of others is seen when the folder is prepared
+        // foreign files are detected when the folder is prepared
         return Ok(Start::New);
     }
     let history = dir.join("history.csv");
@@ -85,7 +85,7 @@ fn without_checkpoint(case: &Case, dir: &Path) -> Result<Start> {
     }
 }
 
-/// What the summary of a folder says about the end of its run; nothing if there is none.
+/// The final verdict in the summary of a folder; empty if there is no summary.
 fn verdict(dir: &Path) -> Result<String> {
     let path = dir.join("summary.json");
     if !path.is_file() {
@@ -94,8 +94,8 @@ fn verdict(dir: &Path) -> Result<String> {
     Ok(parse::file(&path)?["verdict"].as_str().unwrap_or_default().to_owned())
 }
 
-/// Whether a place of a case may change between a run and another that starts from its state after `phases` load steps: names,
-/// outputs, later steps, and time integration but for what fixes the bits of the state and the energy in it.
+/// Whether a field of the case may differ between a run and another run that starts from its state after `phases` load steps:
+/// names, outputs, later steps, and time integration, except settings that fix the bits of the state and its energy.
 pub fn may_differ(place: &str, phases: usize) -> bool {
     let later = |n: &str| n.parse::<usize>().is_ok_and(|n| n >= phases);
     match place.split_once('.') {
@@ -118,7 +118,7 @@ impl Recorded for Place {
 }
 
 impl Run<'_> {
-    /// Everything a run carries besides its simulation; `lengths` are those of its tables, in order.
+    /// The state of a run beyond its simulation; `lengths` are the lengths of its tables, in order.
     fn record(&mut self, lengths: &mut Vec<u64>, record: &mut Record) {
         lengths.record(record);
         self.place.record(record);
@@ -151,7 +151,7 @@ impl Run<'_> {
             .collect()
     }
 
-    /// Begins where `start` says: the simulation is there already, tables and frames follow.
+    /// Begins as `start` says: the simulation is already in that state; tables and frames follow.
     pub(super) fn take_up(&mut self, start: Start) -> Result<()> {
         match start {
             Start::New | Start::Again | Start::Finished => {}
@@ -183,7 +183,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Writes a checkpoint, unless the case wants none; `end` names the load step that is complete.
+    /// Writes a checkpoint if the case wants checkpoints; `end` names the completed load step.
     pub(super) fn save(&mut self, end: Option<&str>) -> Result<()> {
         if self.loaded.case.output.checkpoint_wall_s.is_none() {
             return Ok(());
@@ -206,7 +206,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Keeps the state of now to go back to, if it is time for one.
+    /// Keeps the current state for a rollback if one is due.
     pub(super) fn keep(&mut self) {
         if self.retries.due(&self.simulation) {
             let mut lengths = self.tables().into_iter().map(|table| table.written()).collect();
@@ -216,8 +216,8 @@ impl Run<'_> {
         }
     }
 
-    /// Goes back to an earlier state with its tables and frames, where a guard stopped the run. Whenever it is killed, the last
-    /// checkpoint and the tables fit together.
+    /// Rollback: returns to an earlier state with its tables and frames after a guard stopped the run. Even if the process is
+    /// killed meanwhile, the last checkpoint and the tables are consistent.
     pub(super) fn go_back(&mut self, guard: Guard) -> Result<()> {
         let wall = self.wall();
         let said = guard.to_string();
@@ -234,7 +234,7 @@ impl Run<'_> {
         self.cut(&lengths)
     }
 
-    /// Removes rows and frames behind the state that the run goes on from.
+    /// Removes the rows and frames written after the state from which the run continues.
     fn cut(&mut self, lengths: &[u64]) -> Result<()> {
         self.tables().into_iter().zip(lengths).try_for_each(|(table, len)| table.cut(*len))?;
         directory::tidy(&self.options.output, self.frames.len())
@@ -250,7 +250,7 @@ impl Run<'_> {
         self.due.is_some_and(|due| Instant::now() >= due)
     }
 
-    /// Wall time so far, s, with that of the runs that this one goes on from.
+    /// Wall time so far, s, including the runs that this run continues.
     pub(super) fn wall(&self) -> f64 {
         self.wall_before + self.started.elapsed().as_secs_f64()
     }

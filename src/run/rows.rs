@@ -1,4 +1,4 @@
-//! The rows of a run: at every moment that is written, one row in every table.
+//! The rows of a run: one row in every table at each output time.
 
 use super::session::Run;
 use crate::error::Result;
@@ -9,7 +9,7 @@ use crate::output::rows::{self, Contacts, History, Stitches};
 use crate::rigs::observer::{Loading, Seen};
 
 impl Run<'_> {
-    /// One row in every table.
+    /// Writes one row to every table.
     pub(super) fn write_row(&mut self, phase: &str) -> Result<()> {
         let seen = match &self.yarns {
             Some(_) => {
@@ -54,7 +54,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Keeps the worst of what a run is judged by.
+    /// Updates the worst values of the quality measures of a run.
     fn judge(&mut self, phase: &str) {
         let s = &self.simulation;
         let (e, h) = (s.energies(), s.health());
@@ -69,7 +69,7 @@ impl Run<'_> {
         }
     }
 
-    /// History, energies and contacts.
+    /// Writes history, energies and contacts.
     fn write_history(&mut self, loading: &Loading, phase: &str) -> Result<()> {
         let &Loading { degrees, force, normalised } = loading;
         let s = &self.simulation;
@@ -107,7 +107,7 @@ impl Run<'_> {
         })
     }
 
-    /// Sizes by ply, and yarn by yarn.
+    /// Writes yarn sizes by ply and by yarn.
     fn write_yarns(&mut self, time: f64, degrees: f64, yarns: &[Yarn]) -> Result<()> {
         let Some((plies, each)) = &mut self.yarns else { return Ok(()) };
         let [warp, weft] = [Ply::Warp, Ply::Weft].map(|ply| yarns::ply(yarns, ply));

@@ -1,4 +1,4 @@
-//! One run with its files, from its start or a checkpoint to its end.
+//! One run with its files, from the start or a checkpoint to the end.
 
 use super::grips::Grips;
 use super::log::Log;
@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Runs a case and calls `watch` behind every row of the tables.
+/// Runs a case and calls `watch` after every row of the tables.
 pub(super) fn drive(
     loaded: &Loaded,
     options: &Options,
@@ -57,11 +57,11 @@ pub(super) fn drive(
     run.finish(result)
 }
 
-/// Set by an interrupt: every run of the process stops then. The handler of a process cannot be replaced.
+/// Set by an interrupt, which stops every run of the process. The handler of a process cannot be replaced.
 static STOPPED: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| {
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
-    // without a handler an interrupt ends the process, as it would end any other
+    // without a handler an interrupt ends the process by default
     let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
     stopped
 });
@@ -79,33 +79,33 @@ pub(super) struct Run<'a> {
     pub(super) stitches: Option<Table<Stitches>>,
     pub(super) grips: Option<Grips>,
     pub(super) probes: Option<Probes>,
-    /// What only the rig measures.
+    /// Measures specific to the rig.
     pub(super) observer: Box<dyn Observer>,
     pub(super) frames: Vec<(f64, String)>,
     pub(super) pictures: Vec<String>,
-    /// Number of the last load step in which nothing was loaded, and the share of kinetic in all energy at its end.
+    /// Number of the last load step without load, and the ratio of kinetic to total energy at its end.
     pub(super) rest: Option<(usize, f64)>,
     pub(super) worst_balance: f64,
     pub(super) worst_kinetic: Option<f64>,
     pub(super) largest_added: [f64; 2],
     pub(super) dt_range: [f64; 2],
     pub(super) place: Place,
-    /// States to go back to, each with the record of the run.
+    /// Rollback states, each with the record of the run.
     pub(super) retries: Retries<Vec<u8>>,
     /// When the next checkpoint is due.
     pub(super) due: Option<Instant>,
-    /// Wall time of the runs that this one goes on from, s.
+    /// Wall time of the runs that this run continues, s.
     pub(super) wall_before: f64,
     pub(super) started: Instant,
-    /// Step and wall time, s, at which this process took the run up.
+    /// Step and wall time, s, at which this process started or resumed the run.
     pub(super) taken_up: (u64, f64),
     pub(super) began: SystemTime,
-    /// Lines about the progress, and when the last one was written.
+    /// Progress log, and the time of its last line.
     pub(super) log: Log,
     pub(super) told: Instant,
 }
 
-/// How far a run has come: complete load steps, and complete rows of the next one.
+/// Progress of a run: completed load steps, and completed rows of the next one.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Place {
     pub(super) phase: usize,
@@ -164,7 +164,8 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Everything that is left of the case, from an earlier state with shorter steps where a guard stops it and the case allows.
+    /// Runs the rest of the case. After a guard stops it, the run rolls back to an earlier state with shorter steps if the case
+    /// allows.
     fn go(&mut self, watch: &mut dyn FnMut() -> Duration) -> Result<()> {
         loop {
             match self.load_steps(watch) {
@@ -174,11 +175,11 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Summary and the last lines, whatever the end was.
+    /// Writes the summary and the closing lines, however the run ended.
     fn finish(mut self, result: Result<()>) -> Result<Outcome> {
         let interrupted = self.stopped.load(Ordering::Relaxed);
         if matches!(result, Err(Error::Guard(_))) {
-            // what the scene looks like where it went wrong; a failure to write must not hide the guard
+            // shows the scene where it failed; a failure to write must not hide the guard
             let _ = self.write_frame("stopped");
         }
         let verdict = match &result {
@@ -188,7 +189,7 @@ impl<'a> Run<'a> {
         };
         self.log.add(&format!("step {}: {verdict}", self.simulation.step()));
         let written = self.write_summary(&verdict);
-        // what stopped the run is the error to report, even if it keeps the summary from being written too
+        // the cause of the stop is the error to report, even if the summary cannot be written
         result?;
         written?;
         Ok(Outcome { interrupted, text: self.lines(&verdict) })

@@ -1,4 +1,4 @@
-//! What a run says at its end: `summary.json` for programs, a dozen lines for a person.
+//! The closing report of a run: `summary.json` for programs, a dozen lines for the user.
 
 use super::notes::notes;
 use super::session::Run;
@@ -9,7 +9,7 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::time::SystemTime;
 
-/// Share of kinetic in all energy below which a scene is at rest.
+/// Ratio of kinetic to total energy below which a scene is at rest.
 const AT_REST: f64 = 0.01;
 
 impl Run<'_> {
@@ -24,7 +24,7 @@ impl Run<'_> {
             "verdict": verdict,
             "program": {
                 "version": env!("CARGO_PKG_VERSION"),
-                // builds that are given to others say where they come from
+                // distributed builds state their commit
                 "commit": option_env!("TRICOT_COMMIT"),
                 "command": std::env::args().collect::<Vec<_>>().join(" "),
                 "host": lock::host(),
@@ -69,7 +69,7 @@ impl Run<'_> {
         file::replace(&path, |w| serde_json::to_writer_pretty(w, &summary).map_err(Into::into))
     }
 
-    /// The lines a person wants to read.
+    /// The closing lines for the user.
     pub(super) fn lines(&self, verdict: &str) -> String {
         let s = &self.simulation;
         let (e, h) = (s.energies(), s.health());
@@ -160,7 +160,7 @@ impl Run<'_> {
     }
 }
 
-/// A number with three decimals, or with three digits where these would be zeros.
+/// A number with three decimals, or with three significant digits if the decimals would be zeros.
 fn shown(number: f64) -> String {
     if number == 0.0 || number.abs() >= 0.1 { format!("{number:.3}") } else { format!("{number:.2e}") }
 }

@@ -3,7 +3,7 @@
 use super::number;
 use serde::{Deserialize, Serialize};
 
-/// One crossing of warp and weft at a moment; NaN where the yarns cross no longer.
+/// One crossing of warp and weft at one time; NaN if the yarns cross no longer.
 #[serde_with::apply(f64 => #[serde(serialize_with = "number")])]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Crossing {
@@ -13,15 +13,15 @@ pub struct Crossing {
     pub shear_angle_deg: f64,
     /// Largest prescribed displacement.
     pub displacement_mm: f64,
-    /// A, B or C of a specimen, `none` elsewhere.
+    /// A, B or C in a specimen, `none` elsewhere.
     pub zone: String,
     /// Names of the yarns.
     pub warp: String,
     pub weft: String,
-    /// Where they cross in the reference state.
+    /// Crossing in the reference state.
     pub reference_x_mm: f64,
     pub reference_y_mm: f64,
-    /// Where they cross now.
+    /// Current crossing.
     pub x_mm: f64,
     pub y_mm: f64,
     pub z_mm: f64,
@@ -30,7 +30,7 @@ pub struct Crossing {
     /// Directions of the yarns, from x.
     pub warp_direction_deg: f64,
     pub weft_direction_deg: f64,
-    /// Way of the weft's material point from the warp's.
+    /// Vector from the warp's material point to the weft's.
     pub slip_x_mm: f64,
     pub slip_y_mm: f64,
     /// Sizes at the nearest stations.

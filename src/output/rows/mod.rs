@@ -1,7 +1,7 @@
-//! One type for each table of a run: its fields are the columns, with their names, in their order.
+//! Row types of the tables of a run: the fields of a type are the columns, by name and in order.
 //!
-//! Writing and reading go through the same type, so that a column has its place in the program once. Tables whose columns
-//! depend on the scene (`energies.csv`, `probes.csv`) have none; they are [`Named`](super::table::Named).
+//! Writing and reading use the same type, so each column is declared once. Tables whose columns depend on the scene
+//! (`energies.csv`, `probes.csv`) have no row type; they are [`Named`](super::table::Named).
 
 mod contacts;
 mod crossings;
@@ -28,7 +28,7 @@ pub use zones::Zones;
 use super::table::text;
 use serde::Serializer;
 
-/// How fields that are f64 are written; `serde_with::apply` gives it to all of them.
+/// Serialises fields of type f64; `serde_with::apply` applies it to all of them.
 pub(crate) fn number<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&text(*value))
 }

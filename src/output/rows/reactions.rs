@@ -3,7 +3,7 @@
 use super::number;
 use serde::{Deserialize, Serialize};
 
-/// Force of one grip at a moment.
+/// Force of one grip at one time.
 #[serde_with::apply(f64 => #[serde(serialize_with = "number")])]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Reaction {
@@ -17,6 +17,6 @@ pub struct Reaction {
     pub force_x_n: f64,
     pub force_y_n: f64,
     pub force_z_n: f64,
-    /// Size of that force.
+    /// Magnitude of that force.
     pub force_n: f64,
 }

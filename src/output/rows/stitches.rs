@@ -3,7 +3,7 @@
 use super::number;
 use serde::{Deserialize, Serialize};
 
-/// Tension at a moment, weighted by reference length. Compression is negative, and slack.
+/// Tension at one time, weighted by reference length. Compression is negative and counts as slack.
 #[serde_with::apply(f64 => #[serde(serialize_with = "number")])]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Stitches {
@@ -17,10 +17,10 @@ pub struct Stitches {
     pub tension_max_n: f64,
     /// Share of the length that is slack.
     pub slack_share: f64,
-    /// The same of loops.
+    /// Loops only.
     pub loop_tension_mean_n: f64,
     pub loop_slack_share: f64,
-    /// The same of underlaps.
+    /// Underlaps only.
     pub underlap_tension_mean_n: f64,
     pub underlap_slack_share: f64,
 }

@@ -3,7 +3,7 @@
 use super::number;
 use serde::{Deserialize, Serialize};
 
-/// Stress and fibres of a cell at a moment; x is along the wefts, y along the warps.
+/// Stress and fibre stretch of a cell at one time; x is along the wefts, y along the warps.
 #[serde_with::apply(f64 => #[serde(serialize_with = "number")])]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Stress {

@@ -3,7 +3,7 @@
 use super::number;
 use serde::{Deserialize, Serialize};
 
-/// Sizes of both plies at a moment, as [`measure::yarns`](crate::measure::yarns) defines them.
+/// Sizes of both plies at one time, as defined by [`measure::yarns`](crate::measure::yarns).
 #[serde_with::apply(f64 => #[serde(serialize_with = "number")])]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Yarns {

@@ -3,7 +3,7 @@
 use super::number;
 use serde::{Deserialize, Serialize};
 
-/// Sizes of one yarn at a moment: means over its stations, and the extremes of its width.
+/// Sizes of one yarn at one time: means over its stations, and the extremes of its width.
 #[serde_with::apply(f64 => #[serde(serialize_with = "number")])]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Yarn {

@@ -1,19 +1,19 @@
-//! Further columns of `shear.csv` for a specimen: what its zones show.
+//! Additional columns of `shear.csv` for the zones of a specimen.
 
 use super::number;
 use serde::{Deserialize, Serialize};
 
-/// Means over the crossings well inside each zone at a moment.
+/// Means over the crossings well inside each zone at one time.
 #[serde_with::apply(f64 => #[serde(serialize_with = "number")])]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Zones {
-    /// Angle of zone C without slip (Eq. 18); NaN where no theory holds.
+    /// No-slip angle of zone C (Eq. 18); NaN where the theory does not apply.
     pub theory_angle_deg: f64,
     /// Effective shear angle by zone.
     pub zone_a_angle_deg: f64,
     pub zone_b_angle_deg: f64,
     pub zone_c_angle_deg: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the effective shear angle by zone.
     pub zone_a_angle_std_deg: f64,
     pub zone_b_angle_std_deg: f64,
     pub zone_c_angle_std_deg: f64,

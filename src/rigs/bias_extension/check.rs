@@ -1,4 +1,4 @@
-//! A specimen of fabric: do its sizes, its load steps and its resolution go together?
+//! Checks that the size, load steps and resolution of a bias-extension specimen are consistent.
 
 use crate::case::Case;
 use crate::case::domain::{Clamps, Specimen};
@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::rigs::check::{MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM, fabric, steps};
 use crate::settings::steps::Step;
 
-/// Fewest pitches of either ply along either side.
+/// Smallest number of pitches of each ply along each side.
 const FEWEST_PITCHES: f64 = 2.0;
 
 pub fn check(case: &Case, specimen: &Specimen, provenance: &Provenance) -> Result<()> {

@@ -1,5 +1,5 @@
-//! What the pull of a specimen shows, in sentences with their numbers: zones, how far the effective angle stays behind the
-//! theory without slip, widths and gaps, sliding at the free edges, and which stitches carry.
+//! Findings of a bias-extension test, as sentences with numbers: shear zones, the lag of the effective angle behind the no-slip
+//! theory, widths and gaps, sliding at the free edges, and the load-bearing stitches.
 
 use super::strip;
 use super::zones::Zone;
@@ -15,15 +15,15 @@ use crate::output::vtu_read;
 use crate::rigs::crossings::MARGIN;
 use glam::{DVec2, DVec3, Vec3Swizzles};
 
-/// Angles of Eq. 18 at which the effective angle is stated, degrees.
+/// Angles of Eq. 18 at which the effective angle is reported, degrees.
 const STATED_DEG: [f64; 5] = [10.0, 20.0, 25.0, 30.0, 45.0];
-/// Frames of the pull whose stitches are counted, the last one included.
+/// Number of frames of the pull whose stitches are counted, including the last.
 const FRAMES: usize = 4;
 
-/// Sentences about the pull; none before it begins.
+/// Sentences about the pull; empty before the pull begins.
 ///
 /// # Errors
-/// Files of the run that cannot be read.
+/// A file of the run that cannot be read.
 pub(super) fn findings(specimen: &Specimen, case: &Case, results: &Results) -> Result<Vec<String>> {
     let Some(table) = results.other("shear.csv")? else { return Ok(Vec::new()) };
     let (shear, zones): (Vec<Shear>, Vec<Zones>) = (table.rows()?, table.rows()?);
@@ -45,7 +45,7 @@ pub(super) fn findings(specimen: &Specimen, case: &Case, results: &Results) -> R
     Ok(found)
 }
 
-/// Slip at the free edges beside that inside, at the last frame.
+/// Slip at the free edges compared with slip inside, at the last frame.
 fn edges(specimen: &Specimen, results: &Results) -> Result<Option<String>> {
     let Some(table) = results.other("crossings.csv")? else { return Ok(None) };
     let crossings: Vec<Crossing> = table.rows()?;
@@ -71,7 +71,7 @@ fn edges(specimen: &Specimen, results: &Results) -> Result<Option<String>> {
     )))
 }
 
-/// Which stitches of zone C carry, at some frames of the pull.
+/// Load-bearing stitches of zone C at some frames of the pull.
 fn stitches(specimen: &Specimen, case: &Case, results: &Results) -> Result<Vec<String>> {
     let mesh = fabric::specimen::build(case, case.fabric()?, specimen)?;
     let collection = results.dir.join("run.pvd");
@@ -101,7 +101,7 @@ fn stitches(specimen: &Specimen, case: &Case, results: &Results) -> Result<Vec<S
         .collect()
 }
 
-/// How many legs there are, their mean tension and which share of them is taut, by kind.
+/// Number, mean tension and taut share of the legs, by kind.
 fn carried(legs: &[&Leg]) -> String {
     let share = |name: &str, own: &dyn Fn(&Leg) -> bool| {
         let own: Vec<_> = legs.iter().filter(|l| own(l)).collect();
@@ -120,23 +120,23 @@ fn carried(legs: &[&Leg]) -> String {
         + &format!(" (from {SLACK_BELOW_N} N)")
 }
 
-/// Direction of the fibres of a ply in the plane.
+/// In-plane fibre direction of a ply.
 fn direction(mesh: &Mesh, ply: Ply) -> DVec2 {
     mesh.blocks.iter().find(|b| b.ply == ply).map_or(DVec2::NAN, |b| DVec3::from(b.fibre).xy())
 }
 
-/// The rows of the pull.
+/// Table rows of the pull.
 struct Pull {
     shear: Vec<Shear>,
     zones: Vec<Zones>,
     rows: Vec<usize>,
-    /// The last row before, and the last of all.
+    /// The last row before the pull, and the last row.
     before: usize,
     last: usize,
 }
 
 impl Pull {
-    /// `None`, as of the others, where no crossing lies well inside a zone.
+    /// `None`, as for the other findings, if no crossing lies well inside a zone.
     fn zones(&self) -> Option<String> {
         let zones = &self.zones[self.last];
         let [a, b, c] = [zones.zone_a_angle_deg, zones.zone_b_angle_deg, zones.zone_c_angle_deg];
@@ -150,7 +150,7 @@ impl Pull {
         ))
     }
 
-    /// The effective angle of zone C beside Eq. 18.
+    /// The effective angle of zone C compared with Eq. 18.
     fn lag(&self) -> Option<String> {
         let stated = STATED_DEG.iter().filter_map(|stated| {
             let zones = self.rows.iter().map(|row| &self.zones[*row]).find(|z| z.theory_angle_deg >= *stated)?;

@@ -1,4 +1,4 @@
-//! The bias-extension test: a rectangle cut out of the fabric at an angle, clamped at both ends and pulled.
+//! The bias-extension test: a rectangle cut from the fabric at an angle, clamped at both ends and pulled.
 
 mod check;
 mod clamps;
@@ -24,7 +24,7 @@ use crate::simulate::Simulation;
 use glam::DVec2;
 use zones::Strip;
 
-/// Frames whose crossings are mapped, the last one included.
+/// Number of frames whose crossings are mapped, including the last.
 const MAPS: usize = 3;
 
 impl Rig for Specimen {

@@ -1,4 +1,4 @@
-//! A specimen while it is pulled: the force of the machine, and the shear of its zones beside the theory without slip.
+//! Measures a specimen during the pull: machine force, and shear of its zones compared with the no-slip theory.
 
 use super::clamps::clamped;
 use super::strip;
@@ -18,32 +18,33 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Way of the clamp over a row, mm, that counts as none: the last time step of a load step may reach into the next one.
+/// Clamp travel per row below which the clamp counts as at rest, mm: the last time step of a load step may overlap the next one.
 const STILL: f64 = 1e-5;
-/// Share of its length by which a specimen is pulled before its kinetic energy is judged: 5 mm of 240 mm.
+/// Elongation, as a share of the specimen length, above which the kinetic energy is judged: 5 mm of 240 mm.
 const SETTLED: f64 = 5.0 / 240.0;
-/// Displacements at which the last lines state forces, as shares of the largest one.
+/// Displacements at which the closing lines state forces, as shares of the largest displacement.
 const STATED: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
-/// What a specimen adds to a run.
+/// The bias-extension observer.
 pub(super) struct Pulled {
     crossings: Option<Crossed>,
     length: f64,
-    /// Theory of three zones, where it holds: yarns at ±45° and room for zone C.
+    /// The three-zone theory, where it applies: yarns at ±45° and room for zone C.
     bias: Option<Bias>,
     curve: Option<BiasCurve>,
-    /// Whether each prescribed node is in the clamp that moves.
+    /// Whether each prescribed node belongs to the moving clamp.
     moves: Vec<bool>,
-    /// Displacement, mm, and work of the clamps, mJ, up to which mean forces are known.
+    /// Clamp displacement, mm, and work, mJ, up to which mean forces are known.
     last: [f64; 2],
-    /// Displacement, mm, force of the machine, N, and F_nor, N/mm, at every row of the pull.
+    /// Displacement, mm, machine force, N, and F_nor, N/mm, at every row of the pull.
     rows: Vec<[f64; 3]>,
-    /// Before the pull, and at the last row.
+    /// Readings before the pull and at the last row.
     before: Reading,
     now: Reading,
 }
 
-/// The zones at a row: means of the effective angle in A, B and C, rad; slip in C, width and gap of warp and weft there, mm.
+/// Readings of the zones at a row: mean effective angle in A, B and C, rad; in zone C, slip and the width and gap of warp and
+/// weft, mm.
 #[derive(Debug, Clone, Copy)]
 struct Reading {
     angle: [f64; 3],
@@ -94,10 +95,10 @@ impl Pulled {
         })
     }
 
-    /// Force of the machine, N.
+    /// Machine force, N.
     ///
-    /// It is the mean over the row, ∫F dd / ∫dd: the clamp that is held does no work, so the work of prescribed motion is that of the
-    /// machine. While the clamp stands still, it is the force at the end of the row.
+    /// The force is the mean over the row, ∫F dd / ∫dd. The fixed clamp does no work, so the work of prescribed motion is the
+    /// machine's work. While the clamp stands still, it is the force at the end of the row.
     fn force(&mut self, simulation: &Simulation) -> f64 {
         let (displacement, work) = (simulation.displacement(), simulation.energies().prescribed);
         let [from, done] = self.last;
@@ -111,12 +112,12 @@ impl Pulled {
         -moved.map(|(force, _)| force[0]).sum::<f64>()
     }
 
-    /// Angle of zone C without slip, rad; NaN where no theory holds.
+    /// No-slip angle of zone C, rad; NaN where the theory does not apply.
     fn theory(&self, displacement: f64) -> f64 {
         self.bias.map_or(f64::NAN, |bias| bias.angle(displacement))
     }
 
-    /// Rows of the pull nearest to some displacements.
+    /// Rows of the pull nearest to the given displacements.
     fn stated(&self) -> Vec<[f64; 3]> {
         let end = self.rows.last().map_or(0.0, |row| row[0]);
         let off = |row: &[f64; 3], share: f64| (row[0] - share * end).abs();
@@ -126,7 +127,7 @@ impl Pulled {
         rows
     }
 
-    /// For programs.
+    /// Fields of the summary.
     fn for_programs(&self) -> Value {
         let reading = |r: &Reading| {
             json!({
@@ -148,7 +149,7 @@ impl Pulled {
         })
     }
 
-    /// Three lines for a person.
+    /// Three closing lines for the user.
     fn for_a_person(&self) -> String {
         let mut t = String::new();
         let forces: Vec<String> = self
@@ -172,7 +173,7 @@ impl Pulled {
         let _ = writeln!(t, "force      {forces}");
         let zones = [("A", a), ("B", b), ("C", c)].into_iter().filter(|(_, angle)| !angle.is_nan());
         let zones: Vec<String> = zones.map(|(zone, angle)| format!("{zone} {angle:.2}°")).collect();
-        // other yarns than those at ±45° have no zones of shear
+        // shear zones exist only for yarns at ±45°
         if self.bias.is_none() || zones.is_empty() {
             return t;
         }

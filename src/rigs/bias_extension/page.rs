@@ -1,11 +1,11 @@
-//! The curves of a specimen in a report, and its zones beside the theory.
+//! The curves of a specimen in a report, and its zones compared with the theory.
 
 use crate::error::Result;
 use crate::output::chart::{self, Curve};
 use crate::output::page::Page;
 use crate::output::results::{Axis, Results, short};
 
-/// Rows of the table that compares the zones with the theory.
+/// Number of rows of the table that compares the zones with the theory.
 const COMPARED: usize = 8;
 const OVER_EFFECTIVE: Axis = Axis {
     label: "effective shear angle in zone C, degrees",
@@ -18,7 +18,7 @@ pub(super) fn curves(results: &Results, page: &mut Page) -> Result<()> {
     let (axis, history) = (results.axis(), &results.history);
     let caption = "Of the clamp that moves, along the pull, mean over each row.";
     results.chart(page, history, &axis, ["Force of the machine", "N"], &[("force_n", "force")], caption);
-    // an angle that falls back for a moment has no F_nor: the line goes on behind it
+    // F_nor is undefined where the angle falls back for a moment: the curve continues after it
     let known = |p: &[f64; 2]| p[1].is_finite();
     let points = results.points(history, &OVER_EFFECTIVE, "f_nor_n_per_mm").into_iter().filter(known).collect();
     if let Some(svg) =
@@ -48,7 +48,7 @@ pub(super) fn curves(results: &Results, page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// Zones beside the theory, at evenly chosen rows of the pull.
+/// Zones compared with the theory, at evenly spaced rows of the pull.
 pub(super) fn zones(results: &Results, page: &mut Page) -> Result<()> {
     let Some(shear) = results.other("shear.csv")? else { return Ok(()) };
     let phases = results.history.texts("phase");

@@ -1,13 +1,12 @@
-//! The theory of a bias-extension test whose yarns do not slip: the angle of its central zone, and F_nor from the force of the machine
-//! (Eqs 18 and 19 of Zheng et al.).
+//! Theory of the bias-extension test without slip: the shear angle of the central zone, and F_nor from the machine force (Eqs
+//! 18 and 19 of Zheng et al.).
 //!
-//! With D = H − W the machine has moved by d = D(√2 cos(45° − γ/2) − 1) (Eq. 18 solved for d), so
-//! dd/dγ = (D/2)(cos γ/2 − sin γ/2). Zone C has the area W(2H − 3W)/2 and the angle γ, zone B the area W² and the angle
-//! γ/2, and power balances as
+//! With D = H − W the machine displacement is d = D(√2 cos(45° − γ/2) − 1) (Eq. 18 solved for d), so dd/dγ = (D/2)(cos γ/2 −
+//! sin γ/2). Zone C has the area W(2H − 3W)/2 and the angle γ, zone B the area W² and the angle γ/2. The power balance is
 //!
 //! F_m (D/2)(cos γ/2 − sin γ/2) = W(2H − 3W)/2 · F_nor(γ) cos γ + ½ W² F_nor(γ/2) cos(γ/2),
 //!
-//! which divided by W/2 is Eq. 19.
+//! which, divided by W/2, is Eq. 19.
 
 use crate::error::{Error, Result};
 use crate::kernel::record::{Record, Recorded};
@@ -30,8 +29,8 @@ impl Bias {
         Err(Error::geometry(format!("bias specimen of {height} x {width} mm"), message))
     }
 
-    /// Shear angle of the central zone if nothing slips, after the machine has moved by `displacement` (Eq. 18); NaN
-    /// beyond the displacement at which the yarns would be aligned.
+    /// Shear angle of the central zone without slip at a machine `displacement` (Eq. 18); NaN beyond the displacement at which
+    /// the yarns would be aligned.
     pub fn angle(&self, displacement: f64) -> f64 {
         let d = self.height - self.width;
         FRAC_PI_2 - 2.0 * ((d + displacement) / (SQRT_2 * d)).acos()
@@ -43,9 +42,9 @@ impl Bias {
         (own * law(angle) + half * law(0.5 * angle)) / lever
     }
 
-    /// F_nor, N/mm, at every sample `(angle, force)` (Eq. 19). Angles rise and lie between 0 and 90°. F_nor is taken as
-    /// linear between samples and as 0 at 0, so F_nor(γ/2) only involves samples up to γ itself: one sweep from small to
-    /// large angles solves the implicit equation, and nothing is left to iterate.
+    /// F_nor, N/mm, at every sample `(angle, force)` (Eq. 19). Angles increase and lie between 0 and 90°. F_nor is linear
+    /// between samples and 0 at γ = 0, so F_nor(γ/2) involves only samples up to γ: one sweep in increasing angle solves the
+    /// implicit equation without iteration.
     pub fn normalised(&self, samples: &[(f64, f64)]) -> Result<Vec<f64>> {
         let mut curve = self.curve();
         let point = |&(angle, force): &(f64, f64)| {
@@ -59,7 +58,7 @@ impl Bias {
         samples.iter().map(point).collect()
     }
 
-    /// A curve of F_nor to be filled sample by sample.
+    /// An empty F_nor curve, to be filled sample by sample.
     pub fn curve(self) -> BiasCurve {
         BiasCurve { bias: self, known: vec![(0.0, 0.0)] }
     }
@@ -72,7 +71,7 @@ impl Bias {
     }
 }
 
-/// F_nor of a bias test, sample by sample: what a run knows while it goes on.
+/// F_nor of a bias-extension test, sample by sample, during a run.
 #[derive(Debug, Clone)]
 pub struct BiasCurve {
     bias: Bias,
@@ -80,8 +79,8 @@ pub struct BiasCurve {
 }
 
 impl BiasCurve {
-    /// F_nor, N/mm, at an angle (rad) and machine force (N). A measured angle may stand still or fall back for a moment:
-    /// NaN unless it is above all before, and below 90°.
+    /// F_nor, N/mm, at an angle (rad) and machine force (N). A measured angle may stall or fall back for a moment: the result
+    /// is NaN unless the angle exceeds all earlier ones and is below 90°.
     pub fn push(&mut self, angle: f64, force: f64) -> f64 {
         let (last, _) = self.known[self.known.len() - 1];
         if !(angle > last && angle < FRAC_PI_2 && force.is_finite()) {

@@ -1,4 +1,4 @@
-//! Which nodes of cut threads are held at yarns, and where.
+//! Ties of cut threads: which thread nodes are tied to yarns, and where.
 
 use super::clamps::clamped;
 use crate::case::domain::{Specimen, ThreadEnds};
@@ -9,23 +9,23 @@ use crate::mesh::{Block, Mesh, linking};
 use crate::scene::Tie;
 use std::collections::BTreeMap;
 
-/// Length of thread, from its end or to either side of the top of a loop, of which the node nearest to a yarn is held, mm.
+/// Length of thread, from its end or to either side of a loop apex, within which the node nearest to a yarn is tied, mm.
 const REACH: f64 = 2.0;
-/// Gap between thread and yarn above which it is not held, mm.
+/// Gap between thread and yarn above which a node is not tied, mm.
 const FAR: f64 = 0.3;
-/// A yarn holds worse in its first and last slice: as if it were further away by this, mm.
+/// Distance penalty for the first and last slice of a yarn, where a tie holds less well, mm.
 const TIP: f64 = 0.1;
 
-/// A node at a face of a yarn.
+/// A node tied to a face of a yarn.
 struct Held {
     node: usize,
     corners: [usize; 4],
     weights: [f64; 4],
-    /// Distance from the middle of the thread, and the allowance for tips, mm.
+    /// Distance from the middle of the thread plus the end-slice penalty, mm.
     far: f64,
 }
 
-/// Ties of a specimen whose cut threads are held; none where its ends are free.
+/// Ties of a specimen with held thread ends; empty if the ends are free.
 pub(super) fn ties(specimen: &Specimen, mesh: &Mesh) -> Vec<Tie> {
     if specimen.thread_ends == ThreadEnds::Free {
         return Vec::new();
@@ -50,7 +50,7 @@ pub(super) fn ties(specimen: &Specimen, mesh: &Mesh) -> Vec<Tie> {
     held.into_values().map(|Held { node, corners, weights, .. }| Tie { node, corners, weights }).collect()
 }
 
-/// The first nodes of a run of neighbours along a thread, as far as the reach.
+/// The leading nodes of a run of thread neighbours, within the reach.
 fn within(mesh: &Mesh, run: &[usize]) -> Vec<usize> {
     let mut arc = 0.0;
     let far = run.windows(2).take_while(|pair| {
@@ -61,7 +61,7 @@ fn within(mesh: &Mesh, run: &[usize]) -> Vec<usize> {
     run[..count].to_vec()
 }
 
-/// Holds the node of a run that is nearest to a yarn.
+/// Ties the node of a run that is nearest to a yarn.
 fn hold(mesh: &Mesh, radius: f64, run: &[usize], held: &mut BTreeMap<usize, Held>) {
     let places =
         run.iter().flat_map(|&node| mesh.blocks.iter().filter_map(move |block| nearest(mesh, block, node, radius)));
@@ -70,11 +70,11 @@ fn hold(mesh: &Mesh, radius: f64, run: &[usize], held: &mut BTreeMap<usize, Held
     }
 }
 
-/// The nearest place for a node on the surface of a yarn, if the node stands in front of the inside of a face.
+/// The closest-point projection of a node onto the surface of a yarn, if it falls inside a face and the node lies in front of it.
 fn nearest(mesh: &Mesh, block: &Block, node: usize, radius: f64) -> Option<Held> {
     let at = mesh.nodes[node];
     let surface = Surface::new(block);
-    // the middle of the section, slice by slice
+    // centre of the section, slice by slice
     let middle = |slice: usize| mesh.nodes[block.line(block.columns / 2, block.layers / 2) + slice];
     let mut best: Option<Held> = None;
     for slice in 0..block.slices {

@@ -1,4 +1,4 @@
-//! The three zones of a bias-extension specimen, told by which yarns the clamps hold: both at a point of zone A, one in
+//! The three zones of a bias-extension specimen, defined by how many yarns through a point are clamped: two in zone A, one in
 //! zone B, none in zone C.
 
 use crate::measure::Spread;
@@ -8,11 +8,11 @@ use glam::DVec2;
 /// Zone of a point in the reference state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Zone {
-    /// Both yarns are held: no shear.
+    /// Both yarns are clamped: no shear.
     A,
-    /// One is held: half the shear.
+    /// One yarn is clamped: half the shear angle.
     B,
-    /// None is held: full shear.
+    /// No yarn is clamped: full shear angle.
     C,
 }
 
@@ -26,7 +26,7 @@ impl Zone {
     }
 }
 
-/// The free rectangle between two clamps, in its reference state.
+/// The free rectangle between the clamps in its reference state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strip {
     /// Centre, mm, and unit direction of the pull.
@@ -38,13 +38,13 @@ pub struct Strip {
 }
 
 impl Strip {
-    /// Zone of a point whose two yarns run along `yarns`.
+    /// Zone of a point whose two yarns have the directions `yarns`.
     pub fn zone(&self, point: DVec2, yarns: [DVec2; 2]) -> Zone {
         let held = yarns.into_iter().filter(|&yarn| self.held(point, yarn)).count();
         [Zone::C, Zone::B, Zone::A][held]
     }
 
-    /// Zone of a point at least `margin` (mm, along and across the pull) away from every other zone and from the edges.
+    /// Zone of a point that is at least `margin` (mm, along and across the pull) away from every other zone and from the edges.
     pub fn core(&self, point: DVec2, yarns: [DVec2; 2], margin: f64) -> Option<Zone> {
         let zone = self.zone(point, yarns);
         let along = self.axis * margin;
@@ -56,7 +56,7 @@ impl Strip {
         around.into_iter().all(inside).then_some(zone)
     }
 
-    /// Place along and across the pull, from the centre.
+    /// Coordinates along and across the pull, from the centre.
     fn place(&self, point: DVec2) -> [f64; 2] {
         let way = point - self.centre;
         [self.axis.dot(way), self.axis.perp_dot(way)]
@@ -71,7 +71,7 @@ impl Strip {
     }
 }
 
-/// Spread of a value in zones A, B and C, over the crossings of which a zone is given.
+/// Spread of a value in zones A, B and C, over the crossings with a zone.
 pub fn spreads(crossings: &[Crossing], zones: &[Option<Zone>], value: impl Fn(&Crossing) -> f64 + Copy) -> [Spread; 3] {
     [Zone::A, Zone::B, Zone::C].map(|zone| {
         let own = crossings.iter().zip(zones).filter(move |(_, z)| **z == Some(zone));
@@ -84,10 +84,10 @@ pub fn angles(crossings: &[Crossing], zones: &[Option<Zone>]) -> [Spread; 3] {
     spreads(crossings, zones, |c| c.angle)
 }
 
-/// What is read off the zones of a specimen: means over the crossings of which a zone is given, NaN where there are none.
+/// Zone means over the crossings with a zone; NaN if there are none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Means {
-    /// Effective shear angle in zones A, B and C, rad, and its standard deviation.
+    /// Mean effective shear angle in zones A, B and C, rad, and its standard deviation.
     pub angle: [f64; 3],
     pub angle_std: [f64; 3],
     /// Slip of the plies in zones A, B and C, mm.

@@ -1,4 +1,4 @@
-//! A periodic cell of fabric: do its size, its load steps and its resolution go together?
+//! Checks that the size, load steps and resolution of a periodic fabric cell are consistent.
 
 use crate::case::Case;
 use crate::case::domain::Cell;

@@ -1,4 +1,4 @@
-//! The periodic cell: homogenised shear of a piece of fabric without edges.
+//! The periodic cell: homogenised shear of fabric without edges.
 
 mod check;
 mod observer;

@@ -1,4 +1,4 @@
-//! A cell while it is sheared: F_nor, homogenised stress, membrane forces, crossings, and the sizes of its yarns.
+//! Measures a cell during shear: F_nor, homogenised stress, membrane forces, crossings and yarn sizes.
 
 use crate::case::fabric::Fabric;
 use crate::error::Result;
@@ -19,26 +19,26 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Angle after which the kinetic energy of shear is judged, degrees.
+/// Shear angle above which the kinetic energy is judged, degrees.
 const SETTLED_DEG: f64 = 2.0;
-/// Diagonal of the cell towards which positive shear turns its yarns.
+/// Diagonal of the cell towards which positive shear turns the yarns.
 const DIAGONAL: DVec2 = DVec2::ONE;
-/// Angles at which the last lines state F_nor, degrees, and the distance from them that counts.
+/// Angles at which the closing lines state F_nor, degrees, and their tolerance.
 const STATED_DEG: [f64; 5] = [5.0, 15.0, 25.0, 35.0, 45.0];
 const NEAR_DEG: f64 = 1.0;
 
-/// What a cell adds to a run.
+/// The cell observer.
 pub(super) struct Sheared {
     /// Reference area, mm².
     area: f64,
     force: CellCurve,
     stress: Table<Stress>,
     crossings: Option<Crossed>,
-    /// Sizes of warp and weft in the real fabric, for the last lines.
+    /// Sizes of warp and weft in the real fabric, for the closing lines.
     measured: [String; 2],
-    /// Shear angle, degrees, and F_nor, N/mm, at the rows of shear.
+    /// Shear angle, degrees, and F_nor, N/mm, at every row of shear.
     curve: Vec<(f64, f64)>,
-    /// Squares of the errors of the membrane forces along x and y, (N/mm)², summed over the rows of shear, and their number.
+    /// Squared errors of the membrane forces along x and y, (N/mm)², summed over the rows of shear, and the number of rows.
     missed: [f64; 3],
     /// Mean width, thickness and gap of warp and weft before shear, mm.
     settled: Option<[[f64; 3]; 2]>,
@@ -63,14 +63,14 @@ impl Sheared {
         })
     }
 
-    /// F_nor: the mean over the row, or from V P̄ while the angle does not change, N/mm.
+    /// F_nor, N/mm: the mean over the row, or from V P̄ while the angle is constant.
     fn force(&mut self, simulation: &Simulation, stress: [[f64; 3]; 3]) -> f64 {
         let angle = simulation.load().angle;
         let still = || shear::normalised_force(in_plane(stress), angle, simulation.stretch(), self.area);
         self.force.push(angle, simulation.energies().external).unwrap_or_else(still)
     }
 
-    /// Sizes of yarns before shear, for the last lines.
+    /// Yarn sizes before shear, for the closing lines.
     fn settle(&mut self, simulation: &Simulation) -> Result<()> {
         let frame = simulation.frame();
         simulation.alive()?;
@@ -80,16 +80,16 @@ impl Sheared {
         Ok(())
     }
 
-    /// Root mean square by which the membrane force along x or y missed its aim over the rows of shear, N/mm; `None` without an aim.
+    /// Root-mean-square error of the membrane force along x or y over the rows of shear, N/mm; `None` without a target.
     fn missed(&self, simulation: &Simulation, axis: usize) -> Option<f64> {
         let rows = self.missed[2];
         let driven = simulation.fibres()[axis].error.is_some() && rows > 0.0;
         driven.then(|| libm::sqrt(self.missed[axis] / rows))
     }
 
-    /// F_nor at the stated angles.
+    /// F_nor at the reported angles.
     fn forces(&self) -> Vec<String> {
-        // on the way out: coming back is another curve
+        // loading only: unloading follows another curve
         let mut furthest = 0.0f64;
         let is_new = |(angle, _): &&(f64, f64)| {
             let is_new = angle.abs() >= furthest;
@@ -119,7 +119,7 @@ impl Observer for Sheared {
         let time = simulation.time();
         let degrees = simulation.load().angle.to_degrees();
         let stress = simulation.take_stress().unwrap_or_default();
-        // a mean over the row belongs to its middle
+        // a row mean belongs to the middle of the row
         let middle = 0.5 * (self.force.angle() + simulation.load().angle);
         let normalised = self.force(simulation, stress);
         if seen.phase == "shear" {
@@ -184,7 +184,7 @@ impl Observer for Sheared {
         settled.record(record);
     }
 
-    /// Stretch and membrane force along the fibres, by ply.
+    /// Stretch and membrane force along the fibres of each ply.
     fn summary(&self, simulation: &Simulation) -> Vec<(&'static str, Value)> {
         let [weft, warp] = [0, 1].map(|axis| {
             let fibres = simulation.fibres()[axis];
@@ -232,7 +232,7 @@ impl Observer for Sheared {
     }
 }
 
-/// The components in the plane.
+/// The in-plane components.
 fn in_plane(stress: [[f64; 3]; 3]) -> [[f64; 2]; 2] {
     [0, 1].map(|i| [stress[i][0], stress[i][1]])
 }

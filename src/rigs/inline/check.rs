@@ -1,4 +1,4 @@
-//! A mesh written out in the case: sizes, shapes, names, and what the conditions catch.
+//! Checks an inline mesh: sizes, shapes, names, and the nodes selected by the conditions.
 
 use super::conditions::TOLERANCE_MM;
 use crate::case::Case;
@@ -76,7 +76,7 @@ fn block(block: &InlineBlock, path: &str, provenance: &Provenance) -> Result<()>
     }
 }
 
-/// Number of nodes, and a positive volume at each corner of each hexahedron.
+/// Checks the number of nodes, and for a positive Jacobian determinant at each corner of each hexahedron.
 fn hexes(nodes: &[[f64; 3]], elements: [usize; 3], path: &str, provenance: &Provenance) -> Result<()> {
     let [slices, columns, layers] = elements;
     let count = elements.iter().map(|n| n + 1).product::<usize>();
@@ -124,7 +124,7 @@ fn thread(thread: &InlineThread, path: &str, provenance: &Provenance) -> Result<
     Ok(())
 }
 
-/// A scene may be anywhere, but not longer than positions reach.
+/// The extent of a scene must fit the range of positions; its location is arbitrary.
 fn extent(mesh: &InlineMesh, provenance: &Provenance) -> Result<()> {
     let in_blocks = mesh.blocks.iter().flat_map(|b| {
         let nodes = b.corners.iter().flatten().chain(b.nodes.iter().flatten());

@@ -1,11 +1,11 @@
-//! Conditions of an inline mesh: which nodes each holds or moves.
+//! Conditions of an inline mesh: the nodes that each condition holds or moves.
 
 use crate::case::domain::{Condition, InlineMesh};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::scene::{Motion, prescribed};
 
-/// Nodes closer than this are the same place, mm. Also the tolerance of the boxes of conditions.
+/// Nodes closer than this coincide, mm. Also the tolerance of the condition boxes.
 pub(super) const TOLERANCE_MM: f64 = 1e-6;
 
 /// The motion of each condition.

@@ -1,4 +1,4 @@
-//! A mesh written out in a case.
+//! Builds the mesh that is written inline in a case.
 
 use crate::case::domain::{InlineBlock, InlineMesh, InlineThread};
 use crate::error::{Error, Result};

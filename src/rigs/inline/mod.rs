@@ -1,4 +1,4 @@
-//! A mesh written out in the case, with conditions on its nodes: scenes that verify the solver.
+//! A mesh written inline in the case, with conditions on its nodes: scenes that verify the solver.
 
 mod check;
 mod conditions;

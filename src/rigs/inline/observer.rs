@@ -1,10 +1,10 @@
-//! A scene with conditions: besides what every scene has, there is the force of the machine.
+//! Observer of an inline scene: it adds the machine force to the common measures.
 
 use crate::error::Result;
 use crate::rigs::observer::{Loading, Observer, Seen};
 use crate::simulate::Simulation;
 
-/// What moves the conditions.
+/// The observer of a scene with conditions.
 pub(super) struct Machine;
 
 impl Observer for Machine {
