@@ -1,4 +1,4 @@
-//! A cell of the shipped fabric, built without a case file: pretensioned, driven at a corner, sheared to 10°, with its shear force.
+//! A cell of the shipped fabric, built without a case file: pretensioned, then sheared to 10° with its fibres held.
 
 use serde_json::{Value, json};
 use tricot::prelude::*;

@@ -3,7 +3,7 @@
 //! If only the nodes of a chain of chords made contact, an edge would slip through between two nodes that are further apart
 //! than the thread is thick. Points at most a radius apart prevent this, and they hinder a thread that slides over the edge
 //! less than fewer points would: drawn without friction straight around the side of a yarn in beams of 2.2 radii, it resists
-//! with 0.09 of its tension (rms, `tests/drag.rs`).
+//! with 0.09 of its tension (rms, `tests/physics/drag.rs`).
 //!
 //! A point at a share s of the chord lies κl² s(1 − s)/2 outside the chord, with l the chord's length and κ the curvature,
 //! which follows from the directions of both neighbours and the distances of their midpoints from the beam's. A point is thus

@@ -2,7 +2,7 @@
 //! exact far from the origin as near it.
 //!
 //! A face *owns* some of its edges and corners, so that each edge and corner of a body is owned once: a sum over faces, minus
-//! edges, plus corners is then independent of the subdivision of the surface into faces (see [`super::penalty`]).
+//! edges, plus corners is then independent of the subdivision of the surface into faces (see [`super::potential`]).
 
 use super::{key, shift};
 use crate::kernel::interface::{Constant, constants};

@@ -235,7 +235,8 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
     /// Damping requires the velocity in the middle of a step, but only the velocity half a step earlier is known. The true
     /// value lies between that velocity (other forces hold the contact in equilibrium) and the velocity after half a step of
     /// the elastic force alone (free flight). The smaller of the two in magnitude is used, and zero if their signs differ, so
-    /// that no contact gains energy however few steps it lasts. The dissipation is computed with the mean of both.
+    /// that no contact gains energy however few steps it lasts. The dissipation is computed with the mean of
+    /// both, less what the damping itself slows within half a step.
     #[inline(always)]
     fn resist(&self, pair: &Pair<R>, pressed: R, tangential: R, push: &mut Push<R>, state: &mut [R], sum: &mut [R]) {
         let (zero, one, half) = (R::from_f64(0.0), R::from_f64(1.0), R::from_f64(0.5));

@@ -2,7 +2,7 @@
 //!
 //! An f32 displacement of 60 mm resolves 4e-6 mm, so explicit steps of 1e-8 mm would never change it. Reference positions are
 //! therefore whole multiples of a quantum of 2⁻²³ mm (1.2e-7 mm), and displacements are an i32 number of quanta plus an f32
-//! remainder of at most half a quantum's carry. Differences of near nodes are exact integers before they become f32. The range
+//! remainder, at most half a quantum after the carry. Differences of near nodes are exact integers before they become f32. The range
 //! is ±256 mm. In f64 runs the integer part of displacements stays zero.
 
 use super::interface::{Constant, constants};

@@ -35,7 +35,7 @@ pub struct Model {
     /// Numbers stored per touch of a point, and per slot of a beam.
     pub touch: usize,
     pub slot_state: usize,
-    /// Largest share of the smallest contact radius or yarn thickness, mm, for guards.
+    /// Lengths that guards compare penetrations with.
     pub limits: Limits,
     /// Number of load steps after which each prescribed node acts, in table order.
     pub acts_after: Vec<usize>,
