@@ -7,10 +7,10 @@
 //! that begin with `#` direct the composition:
 //!
 //! - `#include "kernel/math"` inserts a file at its first occurrence; `#include LAW` inserts the file of the material law of
-//! the stage,
+//!   the stage,
 //! - `#if NAME`, `#else`, `#endif` keep lines only if the name is defined, so that an inactive effect leaves no text. The
-//! defined names are those given by the kernel, its own name, `ROOT` in the file of the kernel itself (whose kernels are not
-//! for the files that include it), and names added by `#define NAME`.
+//!   defined names are those given by the kernel, its own name, `ROOT` in the file of the kernel itself (whose kernels are not
+//!   for the files that include it), and names added by `#define NAME`.
 //!
 //! Every line of the text records its source file and line. Group 0 holds the row of the step, group 1 the buffers of the stage
 //! at the slot numbers of the kernel, group 2 the range of items and the parameters of the stage.

@@ -4,7 +4,7 @@
 //! in the plane (x, y) marks one material point on each yarn. In a deformed state:
 //! - the position is the current crossing of the two mid-lines, midway between them in z;
 //! - the effective shear angle is the angle between the mid-lines in the reference state minus the current angle. The direction
-//! of a mid-line at a section is the vector from the previous to the next section, linear in between;
+//!   of a mid-line at a section is the vector from the previous to the next section, linear in between;
 //! - the directions are the mid-line directions at the crossing, oriented along the axis of the shear;
 //! - the slip is the in-plane distance between the two material points;
 //! - widths and gaps are taken from the nearest stations ([`yarns`](super::yarns)).

@@ -6,8 +6,8 @@
 //! - width is the extent of the nodes along n;
 //! - thickness is the largest distance in z between the top and the bottom node of a column;
 //! - gap is the distance along n from the outermost node on the +n side to the facing edge of the next yarn of the same ply.
-//! The edge of a yarn is the chain of its outermost nodes; periodic images up to two cells away are included. A negative gap
-//! means that the two overlap in the plane, by at most half the width. NaN means that there is no next yarn;
+//!   The edge of a yarn is the chain of its outermost nodes; periodic images up to two cells away are included. A negative gap
+//!   means that the two overlap in the plane, by at most half the width. NaN means that there is no next yarn;
 //! - broadness is width plus gap.
 //!
 //! Without shear an undeformed ply has the broadness p (its pitch); under trellis shear without slip it is p cos γ.

@@ -4,7 +4,7 @@
 //! - [`vtu`]: frames and their collection, [`vtu_read`] reads them back; [`map`]: points with values;
 //! - [`table`]: CSV files, each an [`appended`] file; [`rows`]: the types of their rows; [`columns`] reads them back;
 //! - [`picture`] renders a frame: [`scene`] turns it into triangles, [`raster`] draws and lights them with a depth buffer,
-//! [`image`] holds pixels, with letters from [`text`] and colours from [`colour`];
+//!   [`image`] holds pixels, with letters from [`text`] and colours from [`colour`];
 //! - [`page`]: a self-contained HTML page, with charts from [`chart`] and [`scatter`];
 //! - [`checkpoint`]: the state of a run in one file, from which it can resume;
 //! - [`directory`]: results folders, each limited to one run at a time by its [`lock`];
