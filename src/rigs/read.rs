@@ -38,7 +38,7 @@ pub fn read(path: &Path, overrides: &[String]) -> Result<Loaded> {
         provenance.overrides.push(set);
     }
     inline_fabric(&mut value, &mut provenance)?;
-    checked(value, provenance)
+    checked(value, provenance, &schema)
 }
 
 /// Checks a JSON value with inline fabric as if it were a case file.
@@ -46,16 +46,17 @@ pub fn read(path: &Path, overrides: &[String]) -> Result<Loaded> {
 /// # Errors
 /// The first fault, by its JSON path.
 pub fn read_value(value: Value) -> Result<Case> {
-    checked(value, Provenance { case: "case".into(), ..Provenance::default() }).map(|loaded| loaded.case)
+    checked(value, Provenance { case: "case".into(), ..Provenance::default() }, &schema::case())
+        .map(|loaded| loaded.case)
 }
 
 /// The typed case of a value with all overrides applied.
-fn checked(mut value: Value, provenance: Provenance) -> Result<Loaded> {
+fn checked(mut value: Value, provenance: Provenance, schema: &Value) -> Result<Loaded> {
     if ["domain", "steps"].iter().all(|name| value.get(name).is_none()) && value.get("stitch").is_some() {
         let message = "this is a fabric, not a case: give a case that names it in its field `fabric`";
         return Err(provenance.error("", message));
     }
-    validate(&value, Shape::new(&schema::case())).map_err(|fault| provenance.error(&fault.path, fault.message))?;
+    validate(&value, Shape::new(schema)).map_err(|fault| provenance.error(&fault.path, fault.message))?;
     for place in ["", "/fabric"] {
         if let Some(fields) = value.pointer_mut(place).and_then(Value::as_object_mut) {
             fields.remove(schema::SCHEMA);

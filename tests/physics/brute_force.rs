@@ -4,6 +4,7 @@ use crate::common::norm;
 use std::collections::BTreeSet;
 use tricot::mesh::Mesh;
 use tricot::mesh::surface::Surface;
+use tricot::mesh::vector::sub;
 
 /// From the closest point of a bilinear face to a point, by sampling and shrinking.
 fn offset(corners: &[[f64; 3]; 4], point: [f64; 3]) -> [f64; 3] {
@@ -27,10 +28,6 @@ fn offset(corners: &[[f64; 3]; 4], point: [f64; 3]) -> [f64; 3] {
         step *= 0.6;
     }
     best
-}
-
-pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|k| a[k] - b[k])
 }
 
 /// From the closest point of an edge to a point.

@@ -1,10 +1,11 @@
 //! Contact: collisions, Hertz, a patch of uniform pressure, an edge, and the search against brute force.
 
-use super::brute_force::{push, sub};
+use super::brute_force::push;
 use crate::common::{advance, bare, below, block, momenta, near, neo_hookean, norm, positions, shaped, start, with};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use tricot::contact::arc;
+use tricot::mesh::vector::sub;
 use tricot::settings::integration::Precision::{self, F32, F64};
 use tricot::simulate::Simulation;
 

@@ -1,11 +1,12 @@
 //! The contact search against brute force, and where it looks again.
 
-use super::brute_force::{push, sub};
+use super::brute_force::push;
 use super::contact::{field, scene};
 use crate::common::{Random, advance, below, block, cross, loaded, near, neo_hookean, norm, shaped, start, with};
 use serde_json::{Value, json};
 use tricot::contact::found;
 use tricot::mesh::surface::Surface;
+use tricot::mesh::vector::sub;
 use tricot::settings::integration::Precision::{self, F32, F64};
 use tricot::simulate::Simulation;
 
