@@ -1,22 +1,22 @@
 //! Penalty contact of points with the closed surfaces of yarns, every step: points along the beams of a thread, and the nodes
 //! of yarn surfaces.
 //!
-//! The elastic force is the gradient of the potential of [`super::potential`].
+//! The elastic force is the gradient of the potential of [`super::potential`]. The dissipative forces act once per point and body,
+//! see [`super::rub`].
 //!
-//! The dissipative forces do not follow from the potential. Normal damping and friction act once per point and body, along and
-//! across the resultant, against the mean motion of the pushing faces, weighted by their forces: a choice of one wall of a
-//! valley would jump from step to step.
-//!
-//! Every face of a point's list has a gap counter. A face is evaluated again once the bodies can have closed its gap.
+//! Every face of a point's list has a gap counter. A face is evaluated again once the bodies can have closed its gap. All points
+//! of a chunk look at their faces together, see [`super::look`]: first at the faces within reach, then, where a point seems to
+//! be inside, at all faces that could be nearer.
 
 use super::candidates::MADE;
-use super::face::{Closest, Patch, closest};
-use super::friction::slide;
+use super::look::{Glance, Look, Place, Seen, View};
 use super::memory::{CLOSED, DAMPED, ELASTIC, GAPS, INNER, Kept, LEAST, NORMAL, touch};
-use super::potential::{self, Nearest, Point, Push, Pushed, Seen, margin, out};
-use super::sums::{SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
-use super::surface::{self, CARRIED, Corners, POINT, Surface, of_coded};
-use super::{EMPTY, Params, add_force, add_stiffness, candidates, is_in_range, of_key, status, sums};
+use super::potential::{self, Nearest, Pushed, margin};
+use super::press::Joint;
+use super::rub::Rubbed;
+use super::sums::{SUM_ENERGY, SUM_RADIUS};
+use super::surface::{self, CARRIED, FACE, POINT, Surface, of_coded};
+use super::{EMPTY, Params, candidates, of_key, status, sums};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
@@ -24,8 +24,8 @@ use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::position;
 use crate::kernel::row::Row;
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel, raise};
-use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
+use crate::kernel::stage::{Io, Kernel, Own, raise};
+use crate::kernel::vector::fma;
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
@@ -61,33 +61,54 @@ const fn kind(threads: bool) -> usize {
     if threads { 0 } else { 1 }
 }
 
-/// Viscosity, N·s/mm, for a given share of critical damping of a spring of `penalty` (N/mm) between masses of joint inverse
-/// `inverse` (1/tonne).
-#[inline(always)]
-fn viscosity<R: Real>(params: &Params, penalty: R, inverse: R) -> R {
-    R::from_f64(f64::from(params.damping)) * R::from_f64(2.0) * (penalty / inverse).sqrt()
-}
-
 /// Inputs and sums of one step.
-struct Step<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> {
-    params: Params,
-    row: &'a Row<R>,
+pub(super) struct Step<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> {
+    pub params: Params,
+    pub row: &'a Row<R>,
     /// Time since the previous positions, s.
-    elapsed: R,
+    pub elapsed: R,
     surface: Surface<'a, R, PERIODIC>,
-    velocity: Field<'a, R>,
-    mass: &'a [R],
-    forces: &'a [AtomicI32],
-    stiffness: &'a [AtomicI32],
-    flags: &'a [AtomicU32],
+    pub velocity: Field<'a, R>,
+    pub mass: &'a [R],
+    pub forces: &'a [AtomicI32],
+    pub stiffness: &'a [AtomicI32],
+    /// Quanta per force, 1/N, and per stiffness, mm/N: powers of two.
+    pub per_force: R,
+    pub per_stiffness: R,
+    pub flags: &'a [AtomicU32],
     /// Index of the kind of points in the status.
     kind: usize,
 }
 
-/// Damping and friction force on a point, N, and an upper bound of its total stiffness against a body, N/mm.
-struct Rubbed<R> {
-    force: Vector<R>,
-    rows: R,
+/// A point that looks at faces in this step.
+pub(super) struct Walk<'a, R, const N: usize> {
+    item: usize,
+    pub nodes: [usize; N],
+    pub weights: [R; N],
+    /// Radius before stitches are tightened, mm.
+    full_radius: R,
+    /// Sum of the absolute weights.
+    pub size: R,
+    /// The entries of its list.
+    list: &'a [u32],
+    /// Distance by which the bodies can have approached since the last look, mm.
+    closed: R,
+    /// Gap up to which a face can matter: the penetration that the point can have by now, with its margin, mm.
+    most: R,
+    /// The bodies that it may touch, and the least gap to all others, mm.
+    bodies: Range<usize>,
+    least: R,
+}
+
+/// A body that a point may touch.
+struct Body<R> {
+    walk: usize,
+    key: u32,
+    /// Its faces in the list.
+    entries: Range<usize>,
+    /// Faces looked at in the first and in the second look.
+    glances: [Range<usize>; 2],
+    pushed: Pushed<R>,
 }
 
 impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTION, PERIODIC> {
@@ -110,6 +131,8 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
             mass: io.scalars(slot!(&SLOTS, "mass")),
             forces: io.atomics(slot!(&SLOTS, "forces")),
             stiffness: io.atomics(slot!(&SLOTS, "stiffness")),
+            per_force: R::from_f64(1.0 / f64::from(params.force_quantum)),
+            per_stiffness: R::from_f64(1.0 / f64::from(params.stiffness_quantum)),
             flags: io.atomic_uints(slot!(&SLOTS, "status")),
             kind,
         }
@@ -122,126 +145,6 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         self.row.approach * reach * self.elapsed + full_radius * self.row.radius_increment
     }
 
-    /// Forces of all bodies of a list on a point. The bodies can have approached by `closed` since the last evaluation of
-    /// faces, and by `closing` in the last step, mm.
-    #[inline(always)]
-    fn all_bodies<const N: usize>(&self, at: &Point<R, N>, list: &[u32], closed: R, closing: R, kept: &mut Kept<R>) {
-        let zero = R::from_f64(0.0);
-        // upper bound of the penetration of a point that was inside
-        let deepest = kept.gaps[INNER] + closing;
-        let most = deepest + margin(at.radius + deepest);
-        let skin = R::from_f64(f64::from(self.params.skin));
-        let (mut least, mut inner) = (skin, zero);
-        let (mut own, mut energy, mut touching) = ([0i32; 3], zero, false);
-        let mut end = 0;
-        while end < list.len() && list[end] != EMPTY {
-            let (first, body) = (end, self.body(list[end]));
-            let mut nearest = skin;
-            while end < list.len() && list[end] != EMPTY && self.body(list[end]) == body {
-                let gap = &mut kept.gaps[GAPS + end];
-                *gap = *gap - closed;
-                nearest = nearest.min(*gap);
-                end += 1;
-            }
-            if nearest > most {
-                least = least.min(nearest);
-                continue;
-            }
-            let (entries, gaps) = (&list[first..end], GAPS + first..GAPS + end);
-            let mut pushed = self.look(at, entries, &mut kept.gaps[gaps.clone()], most);
-            least = kept.gaps[gaps.clone()].iter().fold(least, |least, gap| least.min(*gap));
-            let depth = if pushed.is_behind(&self.params, most) { pushed.push_out(at) } else { zero };
-            inner = inner.max(depth);
-            if let Some(rubbed) = self.settle(at, body, depth, &mut pushed, kept) {
-                touching = true;
-                for (entry, i) in entries.iter().zip(gaps) {
-                    if kept.gaps[i] < zero || *entry == pushed.nearest.entry {
-                        self.press(at, *entry, &pushed, &rubbed, &mut own, kept.sums);
-                    }
-                }
-            }
-            energy = energy + pushed.energy;
-        }
-        (kept.gaps[LEAST], kept.gaps[CLOSED], kept.gaps[INNER]) =
-            (least - inner - margin(at.radius + inner), zero, inner);
-        kept.sums[SUM_ENERGY] = energy;
-        if own != [0; 3] {
-            self.share_out(at, own);
-        }
-        if touching {
-            self.flags[status::TOUCHING[self.kind]].fetch_add(1, Ordering::Relaxed);
-        }
-    }
-
-    /// Damping, friction, and the end of a body's touch; returns the forces if it still touches.
-    #[inline(always)]
-    fn settle<const N: usize>(
-        &self,
-        at: &Point<R, N>,
-        body: u32,
-        depth: R,
-        pushed: &mut Pushed<R>,
-        kept: &mut Kept<R>,
-    ) -> Option<Rubbed<R>> {
-        let (zero, size) = (R::from_f64(0.0), const { touch(FRICTION) });
-        let touches = pushed.features > zero;
-        let keys = &mut kept.keys[MADE..];
-        let slot = place_of(keys, body, touches)?;
-        let touch = &mut kept.touches[size * slot..][..size];
-        let rubbed = self.rub(at, pushed, touch, kept.sums);
-        let work = pushed.pressing * at.full_radius * self.row.radius_increment;
-        kept.sums[SUM_RADIUS] = kept.sums[SUM_RADIUS] + work;
-        if !touches {
-            keys[slot] = EMPTY;
-            touch.fill(zero);
-            return None;
-        }
-        keys[slot] = body;
-        let outside = (at.radius - pushed.nearest.distance).max(zero);
-        raise(&self.flags[status::PENETRATION[self.kind]], if depth > zero { at.radius + depth } else { outside });
-        Some(rubbed)
-    }
-
-    /// Adds the forces of a face on a point; returns the gap or a lower bound of it, mm. A face whose gap certainly exceeds
-    /// `most` is not evaluated closely.
-    #[inline(always)]
-    fn face<const N: usize>(&self, at: &Point<R, N>, entry: u32, most: R, pushed: &mut Pushed<R>) -> R {
-        let corners = self.corners(at, entry);
-        let patch = Patch::new(&corners.current);
-        let sure = patch.nearest() - at.radius;
-        if sure > most {
-            return sure;
-        }
-        let seen = self.see(at, entry, corners, &patch);
-        let Seen { point, push, .. } = &seen;
-        pushed.add(push);
-        let (zero, is_nearer) = (R::from_f64(0.0), pushed.is_nearer(point));
-        if is_nearer {
-            let Closest { away, distance, height, .. } = *point;
-            pushed.nearest = Nearest { found: true, entry, away, distance, height };
-        }
-        let gap = point.distance - at.radius;
-        let force = at.penalty * (-gap).max(zero);
-        if force > zero || is_nearer {
-            pushed.last = seen;
-        }
-        let alone = !(pushed.shared > zero);
-        if force > zero || alone && is_nearer {
-            let share = if force > zero { force } else { R::from_f64(1.0) };
-            if alone {
-                (pushed.motion, pushed.apart, pushed.inverse) = ([zero; 3], [zero; 3], zero);
-            }
-            for (a, weight) in point.weights.into_iter().enumerate() {
-                let node = corners.nodes[a];
-                pushed.motion = fma(self.velocity.at(node), share * weight, pushed.motion);
-                pushed.apart = fma(corners.reference[a], share * weight, pushed.apart);
-                pushed.inverse = pushed.inverse + share * (weight * weight / self.mass[node]);
-            }
-            pushed.shared = pushed.shared + force;
-        }
-        gap
-    }
-
     /// The body of an entry.
     #[inline(always)]
     fn body(&self, entry: u32) -> u32 {
@@ -249,158 +152,190 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         self.surface.body(face, image)
     }
 
-    /// Forces of a body on a point, by its entries and their gaps: entries with gaps up to `most` are evaluated.
+    /// Updates the gaps of a point; lists the bodies that it may touch, and their faces within reach.
     #[inline(always)]
-    fn look<const N: usize>(&self, at: &Point<R, N>, entries: &[u32], gaps: &mut [R], most: R) -> Pushed<R> {
-        let mut pushed = Pushed::none();
-        for again in [false, true] {
-            // a point that seems to be inside is inside only if no other face is nearer
-            if again && !pushed.is_behind(&self.params, most) {
-                break;
+    fn begin<const N: usize>(
+        &self,
+        walk: (usize, &mut Walk<R, N>),
+        kept: &mut Kept<R>,
+        bodies: &mut Vec<Body<R>>,
+        glances: &mut Vec<Glance<R>>,
+    ) {
+        let (number, walk) = walk;
+        let first = bodies.len();
+        let mut end = 0;
+        while end < walk.list.len() && walk.list[end] != EMPTY {
+            let (start, key) = (end, self.body(walk.list[end]));
+            let mut nearest = R::from_f64(f64::from(self.params.skin));
+            while end < walk.list.len() && walk.list[end] != EMPTY && self.body(walk.list[end]) == key {
+                let gap = &mut kept.gaps[GAPS + end];
+                *gap = *gap - walk.closed;
+                nearest = nearest.min(*gap);
+                end += 1;
             }
-            for (gap, entry) in gaps.iter_mut().zip(entries) {
-                let limit = if again { pushed.beyond() - at.radius } else { most };
-                if (*gap > most) == again && *gap <= limit {
-                    *gap = self.face(at, *entry, limit, &mut pushed);
+            if nearest > walk.most {
+                walk.least = walk.least.min(nearest);
+                continue;
+            }
+            let entries = start..end;
+            let looked_at = glances.len();
+            for place in entries.clone() {
+                if !(kept.gaps[GAPS + place] > walk.most) {
+                    glances.push(Glance { view: number, entry: walk.list[place], place, limit: walk.most });
                 }
             }
+            let glances = [looked_at..glances.len(), 0..0];
+            bodies.push(Body { walk: number, key, entries, glances, pushed: Pushed::none() });
         }
-        pushed
+        walk.bodies = first..bodies.len();
     }
 
-    /// The corners of a face.
+    /// Faces of a body to look at a second time: those that could be nearer than the nearest known one.
     #[inline(always)]
-    fn corners<const N: usize>(&self, at: &Point<R, N>, entry: u32) -> Corners<R> {
-        let (face, image) = of_key(entry);
-        self.surface.corners(face, image, at.nodes[0], at.from)
-    }
-
-    /// Evaluates a face closely.
-    #[inline(always)]
-    fn see<const N: usize>(&self, at: &Point<R, N>, entry: u32, corners: Corners<R>, patch: &Patch<R>) -> Seen<R> {
-        let point = closest(&corners.current, patch);
-        let push = Push::of_face(at, &corners.current, self.surface.marks(of_key(entry).0), &point);
-        Seen { entry, corners, point, push }
-    }
-
-    /// Adds the forces of a face on a point to the nodes, with its share of damping and friction.
-    #[inline(always)]
-    fn press<const N: usize>(
+    fn beyond<const N: usize>(
         &self,
-        at: &Point<R, N>,
-        entry: u32,
-        pushed: &Pushed<R>,
-        rubbed: &Rubbed<R>,
-        own: &mut [i32; 3],
-        sums: &mut [R],
+        body: &Body<R>,
+        (walk, view): (&Walk<R, N>, &View<R>),
+        (first, seen): (&[Glance<R>], &Seen<R>),
+        gaps: &[R],
+        second: &mut Vec<Glance<R>>,
     ) {
-        let Seen { corners, point, mut push, .. } = if entry == pushed.last.entry {
-            pushed.last
-        } else {
-            let corners = self.corners(at, entry);
-            self.see(at, entry, corners, &Patch::new(&corners.current))
-        };
-        let (zero, is_nearest) = (R::from_f64(0.0), entry == pushed.nearest.entry);
-        if pushed.inside && is_nearest {
-            let (force, energy) = out(at, point.distance);
-            push.add(point.weights, scale(point.away, R::from_f64(-1.0)), force, energy);
+        let limit = body.pushed.beyond() - view.radius;
+        for place in body.entries.clone() {
+            let known = || body.glances[0].clone().any(|glance| first[glance].place == place && seen.is_close(glance));
+            let gap = gaps[GAPS + place];
+            if gap > walk.most && gap <= limit && !known() {
+                second.push(Glance { view: body.walk, entry: walk.list[place], place, limit });
+            }
         }
-        let alone = if is_nearest { R::from_f64(1.0) } else { zero };
-        let force = at.penalty * (at.radius - point.distance).max(zero);
-        let share = if pushed.shared > zero { force / pushed.shared } else { alone };
-        for (pull, weight) in push.pull.iter_mut().zip(point.weights) {
-            *pull = fma(rubbed.force, -(share * weight), *pull);
-        }
-        self.pull(&corners, &push.pull, own, sums);
-        let quantum = R::from_f64(f64::from(self.params.stiffness_quantum));
-        add_stiffness(self.stiffness, rubbed.rows * share, quantum, corners.nodes.into_iter().zip(point.weights));
     }
 
-    /// Adds forces to the corners of a face and their opposite to the force on the point, as integers whose sum is zero: the
-    /// last corner takes the rounding error of the others.
+    /// Adds the forces of a face on a point, and updates its gap.
     #[inline(always)]
-    fn pull(&self, corners: &Corners<R>, pull: &[Vector<R>; 4], own: &mut [i32; 3], sums: &mut [R]) {
-        let quantum = R::from_f64(f64::from(self.params.force_quantum));
-        let sum = add(add(pull[0], pull[1]), add(pull[2], pull[3])).map(|f| f / quantum);
-        if !sum.iter().all(|q| is_in_range(self.flags, *q, corners.nodes[0])) {
+    fn fold(
+        &self,
+        pushed: &mut Pushed<R>,
+        view: &View<R>,
+        glance: (usize, &Glance<R>),
+        limit: R,
+        seen: &Seen<R>,
+        gap: &mut R,
+    ) {
+        let (number, glance) = glance;
+        *gap = seen.bounds[number];
+        if *gap > limit {
             return;
         }
-        let mut rest = sum.map(|q| q.to_i32());
-        for k in 0..3 {
-            own[k] = own[k].wrapping_sub(rest[k]);
+        let Some(face) = seen.face(number) else { return };
+        *gap = face.distance - view.radius;
+        pushed.add(&face);
+        let (zero, is_nearer) = (R::from_f64(0.0), pushed.is_nearer(&face));
+        if is_nearer {
+            let (entry, away, distance, height) = (glance.entry, face.away, face.distance, face.height);
+            pushed.nearest = Nearest { found: true, entry, away, distance, height };
         }
-        for a in 0..4 {
-            let part = if a == 3 { rest } else { pull[a].map(|f| (f / quantum).to_i32()) };
-            for k in 0..3 {
-                rest[k] = rest[k].wrapping_sub(part[k]);
+        let force = view.penalty * (-*gap).max(zero);
+        let alone = !(pushed.shared > zero);
+        if force > zero || alone && is_nearer {
+            let share = if force > zero { force } else { R::from_f64(1.0) };
+            if alone {
+                (pushed.motion, pushed.apart, pushed.inverse) = ([zero; 3], [zero; 3], zero);
             }
-            add_force(self.forces, corners.nodes[a], part);
+            let nodes = self.nodes(glance.entry);
+            for a in 0..4 {
+                let weight = face.weights[a];
+                pushed.motion = fma(self.velocity.at(nodes[a]), share * weight, pushed.motion);
+                pushed.inverse = pushed.inverse + share * (weight * weight / self.mass[nodes[a]]);
+            }
             if PERIODIC {
-                add_virial(&mut sums[virial(FRICTION)..], pull[a], corners.reference[a]);
+                let reference = seen.reference(number);
+                for a in 0..4 {
+                    pushed.apart = fma(reference[a], share * face.weights[a], pushed.apart);
+                }
             }
+            pushed.shared = pushed.shared + force;
         }
     }
 
-    /// Damping and friction, once per point and body: against the mean motion of the pushing faces, weighted by their forces.
-    /// An existing touch continues with its state.
+    /// The nodes of a face.
     #[inline(always)]
-    fn rub<const N: usize>(
+    pub(super) fn nodes(&self, entry: u32) -> [usize; 4] {
+        let corners = &self.surface.faces[FACE * of_key(entry).0..][..4];
+        [of_coded(corners[0]).0, of_coded(corners[1]).0, of_coded(corners[2]).0, of_coded(corners[3]).0]
+    }
+
+    /// Forces of all bodies on a point after all faces were looked at. Returns whether it touches any.
+    #[inline(always)]
+    fn end<const N: usize>(
         &self,
-        at: &Point<R, N>,
-        pushed: &mut Pushed<R>,
-        touch: &mut [R],
-        sums: &mut [R],
-    ) -> Rubbed<R> {
-        let (zero, half, two) = (R::from_f64(0.0), R::from_f64(0.5), R::from_f64(2.0));
-        let shared = if pushed.shared > zero { pushed.shared } else { R::from_f64(1.0) };
-        let mut motion = scale(pushed.motion, R::from_f64(-1.0) / shared);
-        let mut inverse = pushed.inverse / shared;
-        for (node, weight) in at.nodes.into_iter().zip(at.weights) {
-            motion = fma(self.velocity.at(node), weight, motion);
-            inverse = inverse + weight * weight / self.mass[node];
+        (walk, view): (&Walk<R, N>, &View<R>),
+        bodies: &mut [Body<R>],
+        looks: [(&[Glance<R>], &Seen<R>); 2],
+        kept: &mut Kept<R>,
+        (corners, carriers): (&mut Joint<4>, &mut Joint<N>),
+    ) -> bool {
+        let zero = R::from_f64(0.0);
+        let (mut least, mut inner) = (walk.least, zero);
+        let (mut own, mut energy, mut touching) = ([0i32; 3], zero, false);
+        for body in &mut bodies[walk.bodies.clone()] {
+            let pushed = &mut body.pushed;
+            for place in body.entries.clone() {
+                least = least.min(kept.gaps[GAPS + place]);
+            }
+            let depth = if pushed.is_behind(&self.params, walk.most) { pushed.push_out(view) } else { zero };
+            inner = inner.max(depth);
+            if let Some(rubbed) = self.settle((walk, view), (body.key, depth), pushed, kept, carriers) {
+                touching = true;
+                for look in 0..2 {
+                    let (glances, seen) = looks[look];
+                    for number in body.glances[look].clone() {
+                        let Glance { entry, place, .. } = glances[number];
+                        if seen.is_close(number) && (kept.gaps[GAPS + place] < zero || entry == pushed.nearest.entry) {
+                            let forces = (&*pushed, &rubbed);
+                            self.press(view, (number, entry), seen, forces, corners, &mut own, kept.sums);
+                        }
+                    }
+                }
+            }
+            energy = energy + pushed.energy;
         }
-        if PERIODIC {
-            let apart = scale(pushed.apart, R::from_f64(-1.0) / shared);
-            motion = add(motion, apply(&self.row.rate, apart));
+        (kept.gaps[LEAST], kept.gaps[CLOSED], kept.gaps[INNER]) =
+            (least - inner - margin(view.radius + inner), zero, inner);
+        kept.sums[SUM_ENERGY] = energy;
+        if own != [0; 3] {
+            self.share_out(walk, own, carriers);
         }
-        let size = norm(pushed.push);
-        let normal = if size > zero { scale(pushed.push, R::from_f64(1.0) / size) } else { pushed.nearest.away };
-        let approach = dot(motion, normal);
-        let viscosity = viscosity(&self.params, at.penalty, inverse);
-        let pressing = (size - viscosity * approach).max(zero);
-        // over the motion since the previous positions, with the mean of the old and new forces
-        let drag = size - pressing;
-        sums[SUM_DAMPING] = sums[SUM_DAMPING] + half * (touch[DAMPED] + drag) * approach * self.elapsed;
-        (touch[NORMAL], touch[DAMPED]) = (pressing, drag);
-        let mut force = scale(normal, -drag);
-        if FRICTION {
-            let tangential = at.penalty * R::from_f64(f64::from(self.params.tangential));
-            let limit = R::from_f64(f64::from(self.params.friction)) * pressing;
-            let elastic = [touch[ELASTIC], touch[ELASTIC + 1], touch[ELASTIC + 2]];
-            let slid = slide(elastic, scale(motion, self.elapsed), normal, tangential, limit);
-            sums[SUM_FRICTION] = sums[SUM_FRICTION] + slid.dissipated;
-            sums[SUM_SLIP] = sums[SUM_SLIP] + slid.slip;
-            touch[ELASTIC..].copy_from_slice(&slid.elastic);
-            pushed.energy = pushed.energy + half * tangential * dot(slid.elastic, slid.elastic);
-            force = fma(slid.elastic, -tangential, force);
-        }
-        let rows = (R::from_f64(1.0) + at.size) * (at.penalty * pushed.features + viscosity * (two / self.row.dt));
-        let quantum = R::from_f64(f64::from(self.params.stiffness_quantum));
-        add_stiffness(self.stiffness, rows, quantum, at.nodes.into_iter().zip(at.weights));
-        Rubbed { force, rows }
+        touching
     }
 
-    /// Distributes the force on a point to its nodes.
+    /// Damping, friction, and the end of a body's touch; returns the forces if it still touches.
     #[inline(always)]
-    fn share_out<const N: usize>(&self, at: &Point<R, N>, own: [i32; 3]) {
-        let mut rest = own;
-        for i in 0..N {
-            let part = if i + 1 == N { rest } else { own.map(|q| (R::from_i32(q) * at.weights[i]).to_i32()) };
-            for k in 0..3 {
-                rest[k] = rest[k].wrapping_sub(part[k]);
-            }
-            add_force(self.forces, at.nodes[i], part);
+    fn settle<const N: usize>(
+        &self,
+        (walk, view): (&Walk<R, N>, &View<R>),
+        (body, depth): (u32, R),
+        pushed: &mut Pushed<R>,
+        kept: &mut Kept<R>,
+        carriers: &mut Joint<N>,
+    ) -> Option<Rubbed<R>> {
+        let (zero, size) = (R::from_f64(0.0), const { touch(FRICTION) });
+        let touches = pushed.features > zero;
+        let keys = &mut kept.keys[MADE..];
+        let slot = place_of(keys, body, touches)?;
+        let touch = &mut kept.touches[size * slot..][..size];
+        let rubbed = self.rub((walk, view), pushed, touch, kept.sums);
+        self.stiffen(walk, rubbed.rows, carriers);
+        let work = pushed.pressing * walk.full_radius * self.row.radius_increment;
+        kept.sums[SUM_RADIUS] = kept.sums[SUM_RADIUS] + work;
+        if !touches {
+            keys[slot] = EMPTY;
+            touch.fill(zero);
+            return None;
         }
+        keys[slot] = body;
+        let outside = (view.radius - pushed.nearest.distance).max(zero);
+        raise(&self.flags[status::PENETRATION[self.kind]], if depth > zero { view.radius + depth } else { outside });
+        Some(rubbed)
     }
 }
 
@@ -448,23 +383,123 @@ fn run<R: Real, const N: usize, const FRICTION: bool, const PERIODIC: bool>(
     kind: usize,
 ) {
     let step = Step::<_, FRICTION, PERIODIC>::new(io, kind);
-    let (nodes, points) = (io.uints(slot!(&SLOTS, "nodes")), io.scalars(slot!(&SLOTS, "points")));
+    let mut memory = Memory::new(io);
+    let count = items.len();
+    let (mut walks, mut points) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    let mut views = Vec::with_capacity(count);
+    points_in_reach::<_, N, FRICTION, PERIODIC>(io, &step, items, &mut memory, &mut walks, &mut points, &mut views);
+    if walks.is_empty() {
+        return;
+    }
+    let surface = &step.surface;
+    if N > 1 {
+        R::dispatch(io.isa, Place { surface, points: &points, views: &mut views });
+    }
+    let (mut bodies, mut first) = (Vec::with_capacity(count), Vec::with_capacity(2 * count));
+    let mut second = Vec::new();
+    for (number, walk) in walks.iter_mut().enumerate() {
+        let kept = &mut memory.of(walk.item);
+        step.begin((number, walk), kept, &mut bodies, &mut first);
+    }
+    let (mut at_hand, mut farther) = (Seen::default(), Seen::default());
+    R::dispatch(io.isa, Look { surface, views: &views, glances: &first, seen: &mut at_hand });
+    for body in &mut bodies {
+        let (walk, view) = (&walks[body.walk], &views[body.walk]);
+        let kept = memory.of(walk.item);
+        for glance in body.glances[0].clone() {
+            let gap = &mut kept.gaps[GAPS + first[glance].place];
+            step.fold(&mut body.pushed, view, (glance, &first[glance]), walk.most, &at_hand, gap);
+        }
+        // a point that seems to be inside is inside only if no other face is nearer
+        if body.pushed.is_behind(&step.params, walk.most) {
+            let start = second.len();
+            step.beyond(body, (walk, view), (&first, &at_hand), kept.gaps, &mut second);
+            body.glances[1] = start..second.len();
+        }
+    }
+    if !second.is_empty() {
+        R::dispatch(io.isa, Look { surface, views: &views, glances: &second, seen: &mut farther });
+        for body in &mut bodies {
+            let (walk, view) = (&walks[body.walk], &views[body.walk]);
+            let kept = memory.of(walk.item);
+            for glance in body.glances[1].clone() {
+                let limit = body.pushed.beyond() - view.radius;
+                let gap = &mut kept.gaps[GAPS + second[glance].place];
+                if *gap <= limit {
+                    step.fold(&mut body.pushed, view, (glance, &second[glance]), limit, &farther, gap);
+                }
+            }
+        }
+    }
+    let (mut corners, mut carriers, mut touching) = (Joint::new(), Joint::new(), 0);
+    for (walk, view) in walks.iter().zip(&views) {
+        let looks = [(&first[..], &at_hand), (&second[..], &farther)];
+        let kept = &mut memory.of(walk.item);
+        touching += u32::from(step.end((walk, view), &mut bodies, looks, kept, (&mut corners, &mut carriers)));
+    }
+    corners.finish(step.forces, step.stiffness);
+    carriers.finish(step.forces, step.stiffness);
+    if touching > 0 {
+        step.flags[status::TOUCHING[step.kind]].fetch_add(touching, Ordering::Relaxed);
+    }
+}
+
+/// The contact state of all points of a chunk.
+struct Memory<'a, R> {
+    gaps: Own<'a, R>,
+    keys: Own<'a, u32>,
+    touches: Own<'a, R>,
+    sums: Own<'a, R>,
+}
+
+impl<'a, R: Real> Memory<'a, R> {
+    #[inline(always)]
+    fn new(io: &'a Io<R>) -> Self {
+        Self {
+            gaps: io.own(slot!(&SLOTS, "gaps")),
+            keys: io.own(slot!(&SLOTS, "keys")),
+            touches: io.own(slot!(&SLOTS, "touches")),
+            sums: io.own(slot!(&SLOTS, "sums")),
+        }
+    }
+
+    /// The state of a point.
+    #[inline(always)]
+    fn of(&mut self, item: usize) -> Kept<'_, R> {
+        Kept {
+            gaps: self.gaps.item(0, item),
+            keys: self.keys.item(0, item),
+            touches: self.touches.item(0, item),
+            sums: self.sums.item(0, item),
+        }
+    }
+}
+
+/// The points whose bodies can have closed their least gap, with their coded nodes and weights, and their views, still without
+/// positions.
+#[inline(always)]
+fn points_in_reach<'a, R: Real, const N: usize, const FRICTION: bool, const PERIODIC: bool>(
+    io: &'a Io<R>,
+    step: &Step<R, FRICTION, PERIODIC>,
+    items: Range<usize>,
+    memory: &mut Memory<R>,
+    walks: &mut Vec<Walk<'a, R, N>>,
+    points: &mut Vec<([u32; N], [R; N])>,
+    views: &mut Vec<View<R>>,
+) {
+    let (nodes, values) = (io.uints(slot!(&SLOTS, "nodes")), io.scalars(slot!(&SLOTS, "points")));
     let near = io.uints(slot!(&SLOTS, "near"));
-    let (mut gaps, mut keys) = (io.own::<R>(slot!(&SLOTS, "gaps")), io.own::<u32>(slot!(&SLOTS, "keys")));
-    let (mut touches, mut sums) = (io.own::<R>(slot!(&SLOTS, "touches")), io.own::<R>(slot!(&SLOTS, "sums")));
     let (zero, faces) = (R::from_f64(0.0), step.params.faces as usize);
     for item in items {
         let (coded, list) = nodes[CARRIED * item..][..CARRIED].split_at(CARRIED - 1);
         let list = &near[(MADE + faces) * list[0] as usize..][..MADE + faces];
-        let values = &points[POINT * item..][..POINT];
-        let weights: [R; N] = std::array::from_fn(|a| values[a]);
-        let size = weights.iter().fold(zero, |size, weight| size + weight.abs());
-        let mut kept = Kept {
-            gaps: gaps.item(0, item),
-            keys: keys.item(0, item),
-            touches: touches.item(0, item),
-            sums: sums.item(0, item),
-        };
+        let values = &values[POINT * item..][..POINT];
+        let (mut weights, mut size) = ([zero; N], zero);
+        for a in 0..N {
+            weights[a] = values[a];
+            size = size + weights[a].abs();
+        }
+        let kept = &mut memory.of(item);
         kept.renew(list[0], R::from_f64(f64::from(step.params.depth)));
         let closing = step.closing(size, values[5]);
         let closed = kept.gaps[CLOSED] + closing;
@@ -472,16 +507,25 @@ fn run<R: Real, const N: usize, const FRICTION: bool, const PERIODIC: bool>(
             kept.gaps[CLOSED] = closed;
             continue;
         }
-        let coded: [u32; N] = std::array::from_fn(|a| coded[a]);
-        let at = Point {
-            nodes: coded.map(|node| of_coded(node).0),
+        let (mut own, mut places) = ([0; N], [0; N]);
+        for a in 0..N {
+            (own[a], places[a]) = (coded[a], of_coded(coded[a]).0);
+        }
+        let radius = values[5] * io.row.radius;
+        let deepest = kept.gaps[INNER] + closing;
+        walks.push(Walk {
+            item,
+            nodes: places,
             weights,
-            from: step.surface.point(coded, weights),
-            penalty: values[4],
             full_radius: values[5],
-            radius: values[5] * io.row.radius,
             size,
-        };
-        step.all_bodies(&at, &list[MADE..], closed, closing, &mut kept);
+            list: &list[MADE..],
+            closed,
+            most: deepest + margin(radius + deepest),
+            bodies: 0..0,
+            least: R::from_f64(f64::from(step.params.skin)),
+        });
+        points.push((own, weights));
+        views.push(View { base: places[0], from: ([zero; 3], [zero; 3]), radius, penalty: values[4] });
     }
 }

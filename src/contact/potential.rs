@@ -16,11 +16,12 @@
 //! surface the inside and outside energies agree. Yarn nodes have no radius, so only the energy ½ k d² remains.
 
 use super::face::{Closest, OnEdge, on_corner, on_edge};
-use super::surface::Corners;
+use super::look::{Face, View};
+use super::table::LANES;
 use super::{EMPTY, Params};
 use crate::kernel::interface::{Constant, constants};
-use crate::kernel::lane::Real;
-use crate::kernel::vector::{Vector, add, fma, scale};
+use crate::kernel::lane::{Lane, Real};
+use crate::kernel::vector::{Vector, add, fma, scale, select};
 
 /// Upper bound of the rounding error of a gap, mm: a face that touches by less must not be missed, whenever its gap was last
 /// evaluated.
@@ -36,19 +37,6 @@ pub fn margin<R: Real>(distance: R) -> R {
     R::from_f64(2.0 * TIE) * distance + R::from_f64(GAP_ROUNDING)
 }
 
-/// A point that may touch something.
-pub struct Point<R, const N: usize> {
-    pub nodes: [usize; N],
-    pub weights: [R; N],
-    /// Position relative to its first node, in the reference and current states.
-    pub from: (Vector<R>, Vector<R>),
-    pub penalty: R,
-    pub full_radius: R,
-    pub radius: R,
-    /// Sum of the absolute weights.
-    pub size: R,
-}
-
 /// The nearest point of a body's surface: the entry of its face; unit vector from there to the point; distance, and height
 /// above the face, mm.
 #[derive(Clone, Copy)]
@@ -62,107 +50,89 @@ pub struct Nearest<R> {
 
 /// Force, N, and energy, mJ, on a point inside, for its depth below the surface, mm.
 #[inline(always)]
-pub fn out<R: Real, const N: usize>(at: &Point<R, N>, depth: R) -> (R, R) {
+pub fn out<R: Real>(at: &View<R>, depth: R) -> (R, R) {
     let (whole, outside) = (at.radius + depth, (at.radius - depth).max(R::from_f64(0.0)));
     (at.penalty * (whole + outside), R::from_f64(0.5) * at.penalty * (whole * whole - outside * outside))
 }
 
-/// Forces of a face on a point, with the edges and corners that it owns.
+/// Forces of a face on a point, with the edges and corners that it owns; a face and its point in each lane.
 #[derive(Clone, Copy)]
-pub struct Push<R> {
+pub struct Push<L> {
     /// Forces on its corners, N.
-    pub pull: [Vector<R>; 4],
+    pub pull: [Vector<L>; 4],
     /// Energy, mJ, and sum of the force magnitudes, N: the derivative of the energy by the radius.
-    pub energy: R,
-    pub pressing: R,
+    pub energy: L,
+    pub pressing: L,
     /// Number of pushing features.
-    pub count: R,
+    pub count: L,
 }
 
-impl<R: Real> Push<R> {
+impl<L: Lane> Push<L> {
+    /// Adds, in the lanes of a mask, a `force` (N) on the point in the direction `away` from a place given by corner weights, its
+    /// `energy` (mJ), and a `count` of features.
     #[inline(always)]
-    fn none() -> Self {
-        let zero = R::from_f64(0.0);
-        Self { pull: [[zero; 3]; 4], energy: zero, pressing: zero, count: zero }
-    }
-
-    /// Adds a `force` (N) on the point in the direction `away` from a place given by corner weights, and its `energy` (mJ).
-    #[inline(always)]
-    pub fn add(&mut self, weights: [R; 4], away: Vector<R>, force: R, energy: R) {
-        self.energy = self.energy + energy;
-        self.pressing = self.pressing + force;
+    fn add(&mut self, mask: L::Mask, (weights, away): ([L; 4], Vector<L>), force: L, energy: L, count: f64) {
+        self.energy = L::select(mask, self.energy + energy, self.energy);
+        self.pressing = L::select(mask, self.pressing + force, self.pressing);
+        self.count = L::select(mask, self.count + L::new(count), self.count);
         for a in 0..4 {
-            self.pull[a] = fma(away, -(force * weights[a]), self.pull[a]);
+            self.pull[a] = select(mask, fma(away, -(force * weights[a]), self.pull[a]), self.pull[a]);
         }
     }
 
-    /// Adds an edge or a corner within the radius, with its `sign` in the sum.
+    /// Adds an edge or a corner within the radius, with its `sign` in the sum, in lanes where `owned` is positive.
     #[inline(always)]
-    fn add_border<const N: usize>(&mut self, at: &Point<R, N>, border: &OnEdge<R>, sign: f64) {
-        if border.square < at.radius * at.radius {
-            let distance = border.square.sqrt();
-            let depth = at.radius - distance;
-            let force = R::from_f64(sign) * (at.penalty * depth);
-            let away = scale(border.offset, R::from_f64(1.0) / distance.max(R::from_f64(1e-12)));
-            self.add(border.weights, away, force, R::from_f64(0.5) * force * depth);
-            self.count = self.count + R::from_f64(sign).max(R::from_f64(0.0));
-        }
+    fn add_border(&mut self, radius: L, penalty: L, border: &OnEdge<L>, owned: L, sign: f64) {
+        let zero = L::new(0.0);
+        let distance = border.square.sqrt();
+        let depth = radius - distance;
+        let force = L::new(sign) * (penalty * depth);
+        let away = scale(border.offset, L::new(1.0) / distance.max(L::new(1e-12)));
+        let mask = zero.lt(L::select(border.square.lt(radius * radius), owned, zero));
+        self.add(mask, (border.weights, away), force, L::new(0.5) * force * depth, sign.max(0.0));
     }
 
     /// The force on the point, N.
     #[inline(always)]
-    fn total(&self) -> Vector<R> {
+    pub fn total(&self) -> Vector<L> {
         let [a, b, c, d] = self.pull;
-        scale(add(add(a, b), add(c, d)), R::from_f64(-1.0))
+        scale(add(add(a, b), add(c, d)), L::new(-1.0))
     }
 
-    /// Forces of a face with the edges and corners in its `marks`.
+    /// Forces of a face with the edges and corners in its `marks`, on a point of a `radius` (mm) and `penalty` (N/mm).
     #[inline(always)]
-    pub fn of_face<const N: usize>(at: &Point<R, N>, q: &[Vector<R>; 4], marks: u32, point: &Closest<R>) -> Self {
-        let (mut push, depth) = (Self::none(), at.radius - point.distance);
-        if !(depth > R::from_f64(0.0)) {
+    pub fn of_face(radius: L, penalty: L, q: &[Vector<L>; 4], marks: &[u32; LANES], point: &Closest<L>) -> Self {
+        let (zero, depth) = (L::new(0.0), radius - point.distance);
+        let mut push = Self { pull: [[zero; 3]; 4], energy: zero, pressing: zero, count: zero };
+        let touches = zero.lt(depth);
+        if !L::any(touches) {
             return push;
         }
-        let force = at.penalty * depth;
-        push.add(point.weights, point.away, force, R::from_f64(0.5) * force * depth);
-        push.count = R::from_f64(1.0);
+        let force = penalty * depth;
+        push.add(touches, (point.weights, point.away), force, L::new(0.5) * force * depth, 1.0);
         for a in 0..4 {
-            if marks >> a & 1 == 1 {
-                push.add_border(at, &on_edge(q, a), -1.0);
-            }
-            if marks >> (4 + a) & 1 == 1 {
-                push.add_border(at, &on_corner(q, a), 1.0);
-            }
+            let edge = L::select(touches, marked(marks, a), zero);
+            push.add_border(radius, penalty, &on_edge(q, a), edge, -1.0);
+            let corner = L::select(touches, marked(marks, 4 + a), zero);
+            push.add_border(radius, penalty, &on_corner(q, a), corner, 1.0);
         }
         push
     }
 }
 
-/// An evaluated face of a list.
-#[derive(Clone, Copy)]
-pub struct Seen<R> {
-    pub entry: u32,
-    pub corners: Corners<R>,
-    pub point: Closest<R>,
-    pub push: Push<R>,
-}
-
-impl<R: Real> Seen<R> {
-    #[inline(always)]
-    pub fn none() -> Self {
-        let zero = R::from_f64(0.0);
-        let corners = Corners { nodes: [0; 4], reference: [[zero; 3]; 4], current: [[zero; 3]; 4] };
-        let (weights, away) = ([zero; 4], [zero; 3]);
-        let point = Closest { weights, away, distance: zero, height: zero, interior: false };
-        Self { entry: EMPTY, corners, point, push: Push::none() }
+/// One in lanes whose marks have a bit, else zero.
+#[inline(always)]
+fn marked<L: Lane>(marks: &[u32; LANES], bit: usize) -> L {
+    let mut values = [L::Scalar::from_f64(0.0); LANES];
+    for lane in 0..L::WIDTH {
+        values[lane] = L::Scalar::from_i32((marks[lane] >> bit & 1) as i32);
     }
+    L::load(&values)
 }
 
 /// Forces of a body on a point.
 pub struct Pushed<R> {
     pub nearest: Nearest<R>,
-    /// The last face that pushed or was nearest: usually the only one, which need not be evaluated again.
-    pub last: Seen<R>,
     /// Whether the point is pushed out from behind the nearest face.
     pub inside: bool,
     /// Resultant of the elastic forces on the point, N, and their energy, mJ; see [`Push`].
@@ -188,7 +158,6 @@ impl<R: Real> Pushed<R> {
         let (energy, pressing, features, shared, inverse) = (zero, zero, zero, zero, zero);
         Self {
             nearest,
-            last: Seen::none(),
             inside: false,
             push,
             energy,
@@ -204,11 +173,11 @@ impl<R: Real> Pushed<R> {
     /// Whether a place is nearer than the known one. If several faces share the nearest edge or corner, the face seen most
     /// steeply decides on which side the point lies.
     #[inline(always)]
-    pub fn is_nearer(&self, point: &Closest<R>) -> bool {
+    pub fn is_nearer(&self, face: &Face<R>) -> bool {
         let known = &self.nearest;
         let tie = known.distance * R::from_f64(TIE) + R::from_f64(0.1 * GAP_ROUNDING);
-        let apart = point.distance - known.distance;
-        !known.found || apart < -tie || apart <= tie && point.height.abs() > known.height.abs()
+        let apart = face.distance - known.distance;
+        !known.found || apart < -tie || apart <= tie && face.height.abs() > known.height.abs()
     }
 
     /// Whether the point is behind the nearest known place, within the depth that is pushed out, and within `most` (mm), the
@@ -228,7 +197,7 @@ impl<R: Real> Pushed<R> {
 
     /// Adds the force that pushes out a point inside; returns its depth, mm.
     #[inline(always)]
-    pub fn push_out<const N: usize>(&mut self, at: &Point<R, N>) -> R {
+    pub fn push_out(&mut self, at: &View<R>) -> R {
         let Nearest { away, distance, .. } = self.nearest;
         let (force, energy) = out(at, distance);
         self.inside = true;
@@ -241,10 +210,10 @@ impl<R: Real> Pushed<R> {
 
     /// Adds the forces of a face.
     #[inline(always)]
-    pub fn add(&mut self, push: &Push<R>) {
-        self.push = add(self.push, push.total());
-        self.energy = self.energy + push.energy;
-        self.pressing = self.pressing + push.pressing;
-        self.features = self.features + push.count;
+    pub fn add(&mut self, face: &Face<R>) {
+        self.push = add(self.push, face.total);
+        self.energy = self.energy + face.energy;
+        self.pressing = self.pressing + face.pressing;
+        self.features = self.features + face.count;
     }
 }

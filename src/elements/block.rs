@@ -163,7 +163,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
     /// The macroscopic displacement gradient F̄ − I in the fibre's frame, in a periodic scene.
     #[inline(always)]
     pub fn macroscopic<const PERIODIC: bool>(&self, io: &Io<L::Scalar>) -> Option<Tensor<L>> {
-        PERIODIC.then(|| splat_tensor(&turn(&self.scalar_frame(io), &io.row.gradient, false)))
+        if PERIODIC { Some(splat_tensor(&turn(&self.scalar_frame(io), &io.row.gradient, false))) } else { None }
     }
 
     #[inline(always)]
@@ -311,8 +311,8 @@ pub fn cross<L: Lane>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
 #[inline(always)]
 pub fn total<L: Lane>(numbers: &[L; 8], weights: &[L; 8]) -> L {
     let mut sum = numbers[0] * weights[0];
-    for (number, weight) in numbers.iter().zip(weights).skip(1) {
-        sum = number.fma(*weight, sum);
+    for k in 1..8 {
+        sum = numbers[k].fma(weights[k], sum);
     }
     sum
 }

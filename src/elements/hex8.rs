@@ -220,6 +220,12 @@ impl<L: Lane, M: Material> Visitor<L> for Energies<L, M> {
     }
 }
 
+/// Differences along the four edges along ξ.
+#[inline(always)]
+fn edges<L: Lane>(u: &[L; 8]) -> [L; 4] {
+    [u[1] - u[0], u[3] - u[2], u[5] - u[4], u[7] - u[6]]
+}
+
 /// Sums the stiffness bound of each corner, modulus × |∂N_a| × Σ|∂N|, from the section, longitudinal shear, tension, and the
 /// part of the fibre stiffness that fibre lines do not cover.
 struct Bounds<L: Lane, M> {
@@ -239,7 +245,10 @@ impl<L: Lane, M: Material> Bounds<L, M> {
     /// the Gauss point may have another direction if the four edges have turned away from each other.
     #[inline(always)]
     fn uncovered(&self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, along: &[L; 8]) -> [L; 8] {
-        let mut sizes = along.map(|slope| slope.abs());
+        let mut sizes = *along;
+        for size in &mut sizes {
+            *size = size.abs();
+        }
         if self.left == 0.0 {
             return sizes;
         }
@@ -290,7 +299,11 @@ impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
             }
         }
         let left = self.uncovered(lanes, point, h, &slopes[0]);
-        let slopes = slopes.map(|slopes| slopes.map(|slope| slope.abs()));
+        for slopes in &mut slopes {
+            for slope in slopes {
+                *slope = slope.abs();
+            }
+        }
         let mut across = slopes[1];
         for (across, other) in across.iter_mut().zip(&slopes[2]) {
             *across = other.fma(*other, *across * *across).sqrt();
@@ -389,7 +402,7 @@ impl<M: Material, const PERIODIC: bool, const WEIGHED: bool> Kernel for Bound<M,
                     material: lanes.material(io),
                     rows: [L::new(0.0); 8],
                     weights: lanes.weights::<WEIGHED>(io, nodes as usize),
-                    edges: u.map(|u| [u[1] - u[0], u[3] - u[2], u[5] - u[4], u[7] - u[6]]),
+                    edges: [edges(&u[0]), edges(&u[1]), edges(&u[2])],
                     macroscopic: lanes.macroscopic::<PERIODIC>(io),
                     left,
                     law: PhantomData,

@@ -40,6 +40,8 @@ pub trait Lane:
     fn lt(self, other: Self) -> Self::Mask;
     /// `a` where the mask holds, else `b`.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// Whether the mask holds in any lane.
+    fn any(mask: Self::Mask) -> bool;
     /// `(m, e)` with `self = m 2^e` and m in [√½, √2), for positive normal numbers.
     fn mantissa_exponent(self) -> (Self, Self);
     /// `2^self` for whole numbers in the range of the exponent.
@@ -148,7 +150,7 @@ fn token<S: Simd>() -> S {
 macro_rules! register {
     ($name:ident, $scalar:ident, $register:ident, $mask:ident, $lanes:ident,
      $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $fma:ident, $sqrt:ident, $abs:ident,
-     $lt:ident, $select:ident) => {
+     $lt:ident, $select:ident, $first_true:ident) => {
         impl<S: Simd> Add for $name<S> {
             type Output = Self;
             #[inline(always)]
@@ -219,6 +221,10 @@ macro_rules! register {
             #[inline(always)]
             fn select(mask: Self::Mask, a: Self, b: Self) -> Self {
                 Self(token::<S>().$select(mask, a.0, b.0))
+            }
+            #[inline(always)]
+            fn any(mask: Self::Mask) -> bool {
+                token::<S>().$first_true(mask) < Self::WIDTH
             }
             register!(@whole $name);
         }
@@ -294,7 +300,8 @@ register!(
     sqrt_f32s,
     abs_f32s,
     less_than_f32s,
-    select_f32s
+    select_f32s,
+    first_true_m32s
 );
 register!(
     F64,
@@ -312,7 +319,8 @@ register!(
     sqrt_f64s,
     abs_f64s,
     less_than_f64s,
-    select_f64s
+    select_f64s,
+    first_true_m64s
 );
 
 macro_rules! scalar {
@@ -353,6 +361,10 @@ macro_rules! scalar {
             #[inline(always)]
             fn select(mask: bool, a: Self, b: Self) -> Self {
                 if mask { a } else { b }
+            }
+            #[inline(always)]
+            fn any(mask: bool) -> bool {
+                mask
             }
             #[inline(always)]
             fn mantissa_exponent(self) -> (Self, Self) {

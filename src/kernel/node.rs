@@ -41,6 +41,12 @@ impl<'a, R: Real> Displacements<'a, R> {
         Self { quanta: Planes::new(io.ints(quanta)), remainder: Planes::new(io.scalars(remainder)) }
     }
 
+    /// Quanta and remainders of a node.
+    #[inline(always)]
+    pub fn at(&self, node: usize) -> ([i32; 3], Vector<R>) {
+        (self.quanta.at(node), self.remainder.at(node))
+    }
+
     /// Displacement of `a` minus displacement of `b`, mm.
     #[inline(always)]
     pub fn between(&self, a: usize, b: usize) -> Vector<R> {
@@ -80,6 +86,12 @@ impl<'a> Lattice<'a> {
     #[inline(always)]
     pub fn new<R: Real>(io: &'a Io<R>, index: usize) -> Self {
         Self { quanta: Planes::new(io.ints(index)) }
+    }
+
+    /// Quanta of a node.
+    #[inline(always)]
+    pub fn at(&self, node: usize) -> [i32; 3] {
+        self.quanta.at(node)
     }
 
     /// Reference position of `a` minus that of `b`, plus whole quanta `shift` along x and y, mm.

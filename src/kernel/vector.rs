@@ -47,3 +47,9 @@ pub fn norm<L: Lane>(a: Vector<L>) -> L {
 pub fn apply<L: Lane>(m: &[[L; 3]; 3], a: Vector<L>) -> Vector<L> {
     [dot(m[0], a), dot(m[1], a), dot(m[2], a)]
 }
+
+/// `a` where the mask holds, else `b`.
+#[inline(always)]
+pub fn select<L: Lane>(mask: L::Mask, a: Vector<L>, b: Vector<L>) -> Vector<L> {
+    [L::select(mask, a[0], b[0]), L::select(mask, a[1], b[1]), L::select(mask, a[2], b[2])]
+}

@@ -89,7 +89,7 @@ fn nearest(mesh: &Mesh, block: &Block, node: usize, radius: f64) -> Option<Held>
                 .map(|(ring, slice)| surface.node(ring, slice).node);
             let seen = corners.map(|n| sub(mesh.nodes[n], at));
             let point = closest(&seen, &Patch::new(&seen));
-            if !point.interior || point.distance > radius + FAR {
+            if point.on_border || point.distance > radius + FAR {
                 continue;
             }
             let tip = slice == 0 || slice + 1 == block.slices;

@@ -1,0 +1,156 @@
+//! Forces of faces on points as integers: the forces on the corners of a face and on the nodes that carry a point cancel exactly.
+
+use super::is_in_range;
+use super::look::{Seen, View};
+use super::penalty::{Step, Walk};
+use super::potential::{Pushed, out};
+use super::rub::Rubbed;
+use super::sums::{add_virial, virial};
+use crate::kernel::lane::Real;
+use crate::kernel::vector::{Vector, add, fma, scale};
+use std::sync::atomic::{AtomicI32, Ordering};
+
+/// Forces and stiffness for the corners of a face or the nodes that carry a point, in quanta. Consecutive points often share
+/// these nodes; their sums are added to the nodes together.
+pub(super) struct Joint<const N: usize> {
+    nodes: [usize; N],
+    forces: [[i32; 3]; N],
+    stiffness: [i32; N],
+}
+
+impl<const N: usize> Joint<N> {
+    pub fn new() -> Self {
+        Self { nodes: [0; N], forces: [[0; 3]; N], stiffness: [0; N] }
+    }
+
+    /// Adds the sums to their nodes.
+    #[inline(always)]
+    pub fn finish(&mut self, forces: &[AtomicI32], stiffness: &[AtomicI32]) {
+        let plane = forces.len() / 3;
+        for a in 0..N {
+            for k in 0..3 {
+                if self.forces[a][k] != 0 {
+                    forces[self.nodes[a] + k * plane].fetch_add(self.forces[a][k], Ordering::Relaxed);
+                }
+            }
+            if self.stiffness[a] != 0 {
+                stiffness[self.nodes[a]].fetch_add(self.stiffness[a], Ordering::Relaxed);
+            }
+        }
+        *self = Self { nodes: self.nodes, ..Self::new() };
+    }
+
+    /// The sums of some nodes; those of other nodes are finished first.
+    #[inline(always)]
+    fn of(&mut self, nodes: [usize; N], forces: &[AtomicI32], stiffness: &[AtomicI32]) -> &mut Self {
+        if nodes != self.nodes {
+            self.finish(forces, stiffness);
+            self.nodes = nodes;
+        }
+        self
+    }
+
+    /// Adds stiffness by weights, in quanta.
+    #[inline(always)]
+    fn stiffen<R: Real>(&mut self, quanta: R, weights: &[R; N]) {
+        for a in 0..N {
+            self.stiffness[a] = self.stiffness[a].wrapping_add((quanta * weights[a].abs()).to_i32());
+        }
+    }
+
+    /// Adds a force to a node, in quanta.
+    #[inline(always)]
+    fn push(&mut self, node: usize, force: [i32; 3]) {
+        for k in 0..3 {
+            self.forces[node][k] = self.forces[node][k].wrapping_add(force[k]);
+        }
+    }
+}
+
+/// A vector in quanta.
+#[inline(always)]
+fn quanta<R: Real>(v: Vector<R>) -> [i32; 3] {
+    [v[0].to_i32(), v[1].to_i32(), v[2].to_i32()]
+}
+
+impl<R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'_, R, FRICTION, PERIODIC> {
+    /// Adds the forces of a face on a point to its corners, with its share of damping and friction, and their opposite to the
+    /// force on the point: the last corner takes the rounding error of the others.
+    #[inline(always)]
+    pub(super) fn press(
+        &self,
+        view: &View<R>,
+        (number, entry): (usize, u32),
+        seen: &Seen<R>,
+        (pushed, rubbed): (&Pushed<R>, &Rubbed<R>),
+        corners: &mut Joint<4>,
+        own: &mut [i32; 3],
+        sums: &mut [R],
+    ) {
+        let Some(face) = seen.face(number) else { return };
+        let mut pull = seen.pull(number);
+        let (zero, is_nearest) = (R::from_f64(0.0), entry == pushed.nearest.entry);
+        if pushed.inside && is_nearest {
+            let (force, _) = out(view, face.distance);
+            let away = scale(face.away, R::from_f64(-1.0));
+            for a in 0..4 {
+                pull[a] = fma(away, -(force * face.weights[a]), pull[a]);
+            }
+        }
+        let alone = if is_nearest { R::from_f64(1.0) } else { zero };
+        let force = view.penalty * (view.radius - face.distance).max(zero);
+        let share = if pushed.shared > zero { force / pushed.shared } else { alone };
+        for a in 0..4 {
+            pull[a] = fma(rubbed.force, -(share * face.weights[a]), pull[a]);
+        }
+        let nodes = self.nodes(entry);
+        let joint = corners.of(nodes, self.forces, self.stiffness);
+        joint.stiffen(rubbed.rows * share * self.per_stiffness, &face.weights);
+        let sum = scale(add(add(pull[0], pull[1]), add(pull[2], pull[3])), self.per_force);
+        for sum in sum {
+            if !is_in_range(self.flags, sum, nodes[0]) {
+                return;
+            }
+        }
+        let mut rest = quanta(sum);
+        for k in 0..3 {
+            own[k] = own[k].wrapping_sub(rest[k]);
+        }
+        for a in 0..3 {
+            let part = quanta(scale(pull[a], self.per_force));
+            for k in 0..3 {
+                rest[k] = rest[k].wrapping_sub(part[k]);
+            }
+            joint.push(a, part);
+        }
+        joint.push(3, rest);
+        if PERIODIC {
+            let reference = seen.reference(number);
+            for a in 0..4 {
+                add_virial(&mut sums[virial(FRICTION)..], pull[a], reference[a]);
+            }
+        }
+    }
+
+    /// Adds the stiffness of a touch to the nodes that carry a point.
+    #[inline(always)]
+    pub(super) fn stiffen<const N: usize>(&self, walk: &Walk<R, N>, rows: R, carriers: &mut Joint<N>) {
+        carriers.of(walk.nodes, self.forces, self.stiffness).stiffen(rows * self.per_stiffness, &walk.weights);
+    }
+
+    /// Distributes the force on a point to its nodes.
+    #[inline(always)]
+    pub(super) fn share_out<const N: usize>(&self, walk: &Walk<R, N>, own: [i32; 3], carriers: &mut Joint<N>) {
+        let joint = carriers.of(walk.nodes, self.forces, self.stiffness);
+        let mut rest = own;
+        let all: Vector<R> = [R::from_i32(own[0]), R::from_i32(own[1]), R::from_i32(own[2])];
+        for a in 0..N - 1 {
+            let part = quanta(scale(all, walk.weights[a]));
+            for k in 0..3 {
+                rest[k] = rest[k].wrapping_sub(part[k]);
+            }
+            joint.push(a, part);
+        }
+        joint.push(N - 1, rest);
+    }
+}

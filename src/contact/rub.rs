@@ -1,0 +1,76 @@
+//! Dissipative forces of a touch. Normal damping and friction do not follow from the potential. They act once per point and
+//! body, along and across the resultant, against the mean motion of the pushing faces, weighted by their forces: a choice of one
+//! wall of a valley would jump from step to step.
+
+use super::friction::slide;
+use super::look::View;
+use super::memory::{DAMPED, ELASTIC, NORMAL};
+use super::penalty::{Step, Walk};
+use super::potential::Pushed;
+use super::sums::{SUM_DAMPING, SUM_FRICTION, SUM_SLIP};
+use super::Params;
+use crate::kernel::lane::Real;
+use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
+
+/// Damping and friction force on a point, N, and an upper bound of its total stiffness against a body, N/mm.
+pub(super) struct Rubbed<R> {
+    pub force: Vector<R>,
+    pub rows: R,
+}
+
+/// Viscosity, N·s/mm, for a given share of critical damping of a spring of `penalty` (N/mm) between masses of joint inverse
+/// `inverse` (1/tonne).
+#[inline(always)]
+fn viscosity<R: Real>(params: &Params, penalty: R, inverse: R) -> R {
+    R::from_f64(f64::from(params.damping)) * R::from_f64(2.0) * (penalty / inverse).sqrt()
+}
+
+impl<R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'_, R, FRICTION, PERIODIC> {
+    /// Damping and friction, once per point and body: against the mean motion of the pushing faces, weighted by their forces.
+    /// An existing touch continues with its state.
+    #[inline(always)]
+    pub(super) fn rub<const N: usize>(
+        &self,
+        (walk, view): (&Walk<R, N>, &View<R>),
+        pushed: &mut Pushed<R>,
+        touch: &mut [R],
+        sums: &mut [R],
+    ) -> Rubbed<R> {
+        let (zero, half, two) = (R::from_f64(0.0), R::from_f64(0.5), R::from_f64(2.0));
+        let shared = if pushed.shared > zero { pushed.shared } else { R::from_f64(1.0) };
+        let mut motion = scale(pushed.motion, R::from_f64(-1.0) / shared);
+        let mut inverse = pushed.inverse / shared;
+        for a in 0..N {
+            let (node, weight) = (walk.nodes[a], walk.weights[a]);
+            motion = fma(self.velocity.at(node), weight, motion);
+            inverse = inverse + weight * weight / self.mass[node];
+        }
+        if PERIODIC {
+            let apart = scale(pushed.apart, R::from_f64(-1.0) / shared);
+            motion = add(motion, apply(&self.row.rate, apart));
+        }
+        let size = norm(pushed.push);
+        let normal = if size > zero { scale(pushed.push, R::from_f64(1.0) / size) } else { pushed.nearest.away };
+        let approach = dot(motion, normal);
+        let viscosity = viscosity(&self.params, view.penalty, inverse);
+        let pressing = (size - viscosity * approach).max(zero);
+        // over the motion since the previous positions, with the mean of the old and new forces
+        let drag = size - pressing;
+        sums[SUM_DAMPING] = sums[SUM_DAMPING] + half * (touch[DAMPED] + drag) * approach * self.elapsed;
+        (touch[NORMAL], touch[DAMPED]) = (pressing, drag);
+        let mut force = scale(normal, -drag);
+        if FRICTION {
+            let tangential = view.penalty * R::from_f64(f64::from(self.params.tangential));
+            let limit = R::from_f64(f64::from(self.params.friction)) * pressing;
+            let elastic = [touch[ELASTIC], touch[ELASTIC + 1], touch[ELASTIC + 2]];
+            let slid = slide(elastic, scale(motion, self.elapsed), normal, tangential, limit);
+            sums[SUM_FRICTION] = sums[SUM_FRICTION] + slid.dissipated;
+            sums[SUM_SLIP] = sums[SUM_SLIP] + slid.slip;
+            touch[ELASTIC..].copy_from_slice(&slid.elastic);
+            pushed.energy = pushed.energy + half * tangential * dot(slid.elastic, slid.elastic);
+            force = fma(slid.elastic, -tangential, force);
+        }
+        let rows = (R::from_f64(1.0) + walk.size) * (view.penalty * pushed.features + viscosity * (two / self.row.dt));
+        Rubbed { force, rows }
+    }
+}
