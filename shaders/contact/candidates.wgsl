@@ -70,26 +70,37 @@ fn image_within(place: Place, slab: u32, reach: f32, stretched: vec2<f32>) -> Wi
     return Within(!any(abs(apart) > room), image);
 }
 
-// Whether the box of a face, with corners relative to the same node, is within reach.
-fn is_near(place: Place, q: array<vec3<f32>, 4>, reach: f32) -> bool {
-    let low = min(min(q[0], q[1]), min(q[2], q[3]));
-    let high = max(max(q[0], q[1]), max(q[2], q[3]));
-    let gap = max(max(low - place.high, place.low - high), vec3<f32>(0.0));
-    return dot(gap, gap) <= reach * reach;
+// Whether the box of a face of a slab is within reach; `offset` is the slab's first node relative to the carrier's.
+fn is_near(place: Place, slab: u32, face: u32, offset: vec3<f32>, reach: f32) -> bool {
+    let b = FACE_BOXES * slab + face;
+    let low = vec3<f32>(face_boxes[b], face_boxes[b + SLAB_FACES], face_boxes[b + 2u * SLAB_FACES]);
+    let high = vec3<f32>(
+        face_boxes[b + 3u * SLAB_FACES],
+        face_boxes[b + 4u * SLAB_FACES],
+        face_boxes[b + 5u * SLAB_FACES],
+    );
+    let gap = max(max(low - (place.high - offset), (place.low - offset) - high), vec3<f32>(0.0));
+    let most = reach + ROUNDING;
+    return dot(gap, gap) <= most * most;
 }
 
-// Adds an entry, if it is new, to a list of `count` that starts at `first`; returns the required number of entries, even
-// without room.
-fn add_entry(first: u32, count: u32, entry: u32) -> u32 {
-    let body = body_of(entry);
+// Adds an entry of a body, if it is new, to a list of `count` that starts at `first`; returns the required number of entries,
+// even without room.
+fn add_entry(first: u32, count: u32, body: u32, entry: u32) -> u32 {
     // the first entry that is not smaller
     var low = 0u;
     var high = count;
     while low < high {
         let middle = (low + high) / 2u;
         let known = near[first + middle];
+#if PERIODIC
         let known_body = body_of(known);
-        if known_body < body || known_body == body && known < entry {
+        let is_before = known_body < body || known_body == body && known < entry;
+#else
+        // faces are numbered body by body: without images, entries are in the order of bodies
+        let is_before = known < entry;
+#endif
+        if is_before {
             low = middle + 1u;
         } else {
             high = middle;
@@ -121,10 +132,11 @@ fn bodies_in(first: u32, count: u32) -> u32 {
 
 // Whether a slab belongs to another body and is within reach; its image.
 fn sees(slab: u32, own: u32, place: Place, reach: f32, stretched: vec2<f32>) -> Within {
-    if slab >= params.slabs || marks(slabs[SLAB * slab]) >> 10u == own {
+    if slab >= params.slabs {
         return Within(false, vec2<i32>(0));
     }
-    return image_within(place, slab, reach, stretched);
+    let within = image_within(place, slab, reach, stretched);
+    return Within(within.yes && marks(slabs[SLAB * slab]) >> 10u != own, within.image);
 }
 
 // Whether anything within reach has moved relative to the carrier since the last full search.
@@ -145,7 +157,7 @@ fn searches(carrier: u32, place: Place, xs: vec2<i32>, ys: vec2<i32>, reach: f32
             let cell = cell_index(x, y);
             for (var i = 0u; i < counts[cell]; i++) {
                 let slab = lists[cell * params.capacity + i];
-                if sees(slab, own, place, reach, stretched).yes && has_moved(slab, bounds, f32(params.apart)) {
+                if has_moved(slab, bounds, f32(params.apart)) && sees(slab, own, place, reach, stretched).yes {
                     return true;
                 }
             }
@@ -157,7 +169,6 @@ fn searches(carrier: u32, place: Place, xs: vec2<i32>, ys: vec2<i32>, reach: f32
 // Lists the faces within reach; returns their number.
 fn list_faces(carrier: u32, base: u32, place: Place, xs: vec2<i32>, ys: vec2<i32>, reach: f32, stretched: vec2<f32>) -> u32 {
     let own = carriers[CARRIER * carrier + 2u];
-    let nowhere = Offset(vec3<f32>(0.0), vec3<f32>(0.0));
     let first = (MADE + params.faces) * carrier + MADE;
     var count = 0u;
     for (var y = ys.x; y <= ys.y; y++) {
@@ -169,13 +180,20 @@ fn list_faces(carrier: u32, base: u32, place: Place, xs: vec2<i32>, ys: vec2<i32
                 if !seen.yes {
                     continue;
                 }
-                let from_face = slabs[SLAB * slab];
-                let to_face = from_face + slabs[SLAB * slab + 1u];
-                for (var face = from_face; face < to_face; face++) {
-                    if is_near(place, corners(face, seen.image, base, nowhere).current, reach) {
-                        count = add_entry(first, count, key(face, seen.image));
+                let first_face = slabs[SLAB * slab];
+                let origin = of_coded(faces[FACE * first_face]).node;
+                let offset = from_node(Imaged(origin, seen.image), base).current;
+                let body = body_of(key(first_face, seen.image));
+                for (var face = 0u; face < slabs[SLAB * slab + 1u]; face++) {
+                    if is_near(place, slab, face, offset, reach) {
+                        let known = count;
+                        count = add_entry(first, count, body, key(first_face + face, seen.image));
                         if count > params.faces {
                             return count;
+                        }
+                        // a slab with a known face was in an earlier cell, too
+                        if count == known {
+                            break;
                         }
                     }
                 }

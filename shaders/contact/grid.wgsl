@@ -177,10 +177,20 @@ fn fill_slabs(item: u32) {
     let first = slabs[SLAB * item];
     let origin = of_coded(faces[FACE * first]).node;
     let nowhere = Offset(vec3<f32>(0.0), vec3<f32>(0.0));
-    for (var face = first; face < first + slabs[SLAB * item + 1u]; face++) {
+    for (var place = 0u; place < slabs[SLAB * item + 1u]; place++) {
+        let face = first + place;
+        var low = vec3<f32>(1e9);
+        var high = vec3<f32>(-1e9);
         for (var a = 0u; a < 4u; a++) {
-            bounds = grow(bounds, back, corner(face, a, vec2<i32>(0), origin, nowhere).current);
+            let now = corner(face, a, vec2<i32>(0), origin, nowhere).current;
+            bounds = grow(bounds, back, now);
             bounds = moves(bounds, motion(of_coded(faces[FACE * face + a]).node));
+            low = min(low, now);
+            high = max(high, now);
+        }
+        for (var k = 0u; k < 3u; k++) {
+            face_boxes[FACE_BOXES * item + SLAB_FACES * k + place] = low[k];
+            face_boxes[FACE_BOXES * item + SLAB_FACES * (3u + k) + place] = high[k];
         }
     }
     put(item, origin, back, bounds, params.thread_radius + params.skin);

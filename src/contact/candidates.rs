@@ -1,12 +1,18 @@
 //! Broad-phase candidates: for each carrier of contact points, the faces of other bodies whose box lies within reach of the box
 //! of its points.
 //!
+//! The grid gives the slabs near a carrier, and the boxes of their faces relative to the first node of the slab. The position of
+//! this node relative to the carrier, in the image of the slab, therefore places all faces of the slab at once.
+//!
 //! A list is sorted by body and lateral image, then by face, so it is independent of the order of items in the grid, and the
 //! faces of a body are consecutive. The list holds no state except the number of times it was made: contact state is stored per
 //! body. Carriers keep their lists if nothing near them has moved relative to them (see [`super::skin`]).
 
-use super::grid::{BOX, Moved, SLAB, absolute, cell_index, cells, has_moved, inverse, motion, pull_back, stretch};
-use super::surface::{self, CARRIED, POINT, Surface, entry, of_coded};
+use super::grid::{
+    BOX, FACE_BOXES, Moved, ROUNDING, SLAB, SLAB_FACES, absolute, cell_index, cells, has_moved, inverse, motion,
+    pull_back, stretch,
+};
+use super::surface::{self, CARRIED, FACE, POINT, Surface, entry, of_coded};
 use super::{EMPTY, Params, found, grid, of_key, status};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, constants, slot};
@@ -27,7 +33,7 @@ pub const MADE: usize = 1;
 /// Constants of lists and carriers shared with the twins.
 pub const CONSTANTS: [Constant; 2] = constants![uint: CARRIER, MADE];
 
-const SLOTS: [Slot; 15] = [
+const SLOTS: [Slot; 16] = [
     Slot::read("carriers", Uint),
     Slot::read("nodes", Uint),
     Slot::read("points", Scalar),
@@ -39,6 +45,7 @@ const SLOTS: [Slot; 15] = [
     Slot::read("counts", Uint),
     Slot::read("lists", Uint),
     Slot::read("boxes", Scalar),
+    Slot::read("face_boxes", Scalar),
     // displacements at the last full search, in quanta
     Slot::read("before", Int),
     Slot::row_of_plan("near", Uint),
@@ -116,17 +123,21 @@ impl<R: Real> Place<R> {
         Some(image)
     }
 
-    /// Whether the box of a face, with corners relative to the same node, is within `reach`, mm.
+    /// Whether the box of each face of a slab is within `reach`, mm: their [`FACE_BOXES`], and the slab's first node relative to
+    /// the carrier's, mm.
     #[inline(always)]
-    fn is_near(&self, corners: &[Vector<R>; 4], reach: R) -> bool {
-        let mut square = R::from_f64(0.0);
+    fn are_near(&self, boxes: &[R], offset: Vector<R>, reach: R) -> [bool; SLAB_FACES] {
+        let mut squares = [R::from_f64(0.0); SLAB_FACES];
         for k in 0..3 {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|corner| corners[corner][k]);
-            let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
-            let gap = (low - self.high[k]).max(self.low[k] - high).max(R::from_f64(0.0));
-            square = square + gap * gap;
+            let (from, to) = (self.low[k] - offset[k], self.high[k] - offset[k]);
+            let (low, high) = (&boxes[SLAB_FACES * k..][..SLAB_FACES], &boxes[SLAB_FACES * (3 + k)..][..SLAB_FACES]);
+            for face in 0..SLAB_FACES {
+                let gap = (low[face] - to).max(from - high[face]).max(R::from_f64(0.0));
+                squares[face] = squares[face] + gap * gap;
+            }
         }
-        square <= reach * reach
+        let most = reach + R::from_f64(ROUNDING);
+        squares.map(|square| square <= most * most)
     }
 }
 
@@ -146,22 +157,24 @@ impl<R: Real, const PERIODIC: bool> List<'_, R, PERIODIC> {
         self.surface.body(face, image)
     }
 
-    /// Adds an entry if it is not yet in the list.
+    /// Adds an entry of a body, given as a key; `false` if the list already has it or is full.
     #[inline(always)]
-    fn add(&mut self, entry: u32) {
-        let body = self.body(entry);
-        let order = |known: &u32| (self.body(*known), *known) < (body, entry);
-        let place = self.entries[..self.count].partition_point(order);
+    fn add(&mut self, body: u32, entry: u32) -> bool {
+        // faces are numbered body by body: without images, entries are in the order of bodies
+        let is_before =
+            |known: &u32| if PERIODIC { (self.body(*known), *known) < (body, entry) } else { *known < entry };
+        let place = self.entries[..self.count].partition_point(is_before);
         if self.entries[..self.count].get(place) == Some(&entry) {
-            return;
+            return false;
         }
         if self.count == self.entries.len() {
             self.full = true;
-            return;
+            return false;
         }
         self.entries.copy_within(place..self.count, place + 1);
         self.entries[place] = entry;
         self.count += 1;
+        true
     }
 
     /// Number of bodies in the list.
@@ -215,7 +228,7 @@ fn run<K: Kernel, R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, ite
     let (carriers, slabs) = (io.uints(slot!(&SLOTS, "carriers")), io.uints(slot!(&SLOTS, "slabs")));
     let (nodes, points) = (io.uints(slot!(&SLOTS, "nodes")), io.scalars(slot!(&SLOTS, "points")));
     let (counts, lists) = (io.uints(slot!(&SLOTS, "counts")), io.uints(slot!(&SLOTS, "lists")));
-    let boxes = io.scalars(slot!(&SLOTS, "boxes"));
+    let (boxes, face_boxes) = (io.scalars(slot!(&SLOTS, "boxes")), io.scalars(slot!(&SLOTS, "face_boxes")));
     let mut near = io.own::<u32>(slot!(&SLOTS, "near"));
     let mut when = io.own::<u32>(slot!(&SLOTS, "found_when"));
     let flags = io.atomic_uints(slot!(&SLOTS, "status"));
@@ -245,30 +258,35 @@ fn run<K: Kernel, R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, ite
         if cells.clone().any(|cell| counts[cell] > params.capacity) {
             continue;
         }
-        // slabs of other bodies within reach, and their images
-        let seen = cells.flat_map(|cell| &lists[cell * params.capacity as usize..][..counts[cell] as usize]);
-        let seen = seen.filter(|near| **near < params.slabs).filter_map(|near| {
-            let slab = &slabs[SLAB * *near as usize..][..SLAB];
-            let (first, faces) = (slab[0] as usize, slab[1] as usize);
-            let is_own = surface.marks(first) >> 10 == own;
-            let bounds = &boxes[BOX * *near as usize..][..BOX];
-            let image = if is_own { None } else { place.image_within(bounds, reach, stretch, period) };
-            image.map(|image| (first..first + faces, image, bounds))
-        });
+        // slabs in the cells of the carrier; one may come several times
+        let around = cells.flat_map(|cell| &lists[cell * params.capacity as usize..][..counts[cell] as usize]);
+        let around = around.filter(|near| **near < params.slabs).map(|near| *near as usize);
+        // the image of a slab of another body within reach
+        let image_of = |slab: usize| {
+            let image = place.image_within(&boxes[BOX * slab..][..BOX], reach, stretch, period);
+            image.filter(|_| surface.marks(slabs[SLAB * slab] as usize) >> 10 != own)
+        };
         let when = when.at(0, item);
         if *when == found::WITH_ALL {
             let (least, greatest) = moved::<K, _, N>(io, coded);
-            if !seen.clone().any(|(_, _, bounds)| has_moved(bounds, least, greatest, apart)) {
+            let moving = |slab: &usize| has_moved(&boxes[BOX * *slab..][..BOX], least, greatest, apart);
+            if !around.clone().filter(moving).any(|slab| image_of(slab).is_some()) {
                 continue;
             }
         }
         let (made, entries) = near.item(0, item).split_at_mut(MADE);
         let mut list = List { entries, count: 0, full: false, surface: &surface };
-        let zero = [R::from_f64(0.0); 3];
-        for (faces, image, _) in seen {
-            for face in faces {
-                if place.is_near(&surface.corners(face, image, base, (zero, zero)).current, reach) {
-                    list.add(entry(face, image));
+        for slab in around {
+            let Some(image) = image_of(slab) else { continue };
+            let (first, count) = (slabs[SLAB * slab] as usize, slabs[SLAB * slab + 1] as usize);
+            let origin = of_coded(surface.faces[FACE * first]).0;
+            let offset = surface.from_node(origin, image, base).1;
+            let are_near = place.are_near(&face_boxes[FACE_BOXES * slab..][..FACE_BOXES], offset, reach);
+            let body = surface.body(first, image);
+            for face in 0..count {
+                // a slab with a known face was in an earlier cell, too
+                if are_near[face] && !list.add(body, entry(first + face, image)) {
+                    break;
                 }
             }
         }

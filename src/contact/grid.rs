@@ -2,7 +2,8 @@
 //!
 //! Cells lie in the pulled-back plane F̄⁻¹x, in which the periodic cell remains a rectangle; a distance ρ in space is there at
 //! most ρ |row of F̄⁻¹| along an axis. A cell lists its items in any order, and the candidates chosen from them are independent
-//! of it. Boxes store the motion of their items since the last full search (see [`super::skin`]).
+//! of it. Boxes store the motion of their items since the last full search (see [`super::skin`]). Faces have boxes of their own,
+//! in space, from which candidates are chosen.
 
 use super::arc_offset::{self, OffsetLines};
 use super::surface::{self, FACE, Surface, of_coded};
@@ -29,10 +30,14 @@ const MOST_MOTION: i32 = 1 << 24;
 pub const SLAB: usize = 2;
 /// Largest number of faces per slab.
 pub const SLAB_FACES: usize = 8;
-/// Upper bound of the rounding error of a position in the plane, mm: an item must not be missing from a cell.
-const ROUNDING: f64 = 1e-4;
+/// Numbers per slab for the boxes of its faces: lowest (3) and highest coordinates (3) relative to the slab's first node, mm, each
+/// for all faces side by side. A slab with fewer faces leaves the last places unused.
+pub const FACE_BOXES: usize = 6 * SLAB_FACES;
+/// Upper bound of the rounding error of a position, mm: an item must not be missing from a cell, nor a face from a list.
+pub const ROUNDING: f64 = 1e-4;
 /// Constants of the grid shared with the twins.
-pub const CONSTANTS: [Constant; 5] = constants![uint: BOX, MOTION, SLAB; int: MOST_MOTION; scalar: ROUNDING];
+pub const CONSTANTS: [Constant; 7] =
+    constants![uint: BOX, MOTION, SLAB, SLAB_FACES, FACE_BOXES; int: MOST_MOTION; scalar: ROUNDING];
 
 /// Node positions, the first slots of the stages that fill the grid.
 const PLACE: [Slot; 3] = [Slot::read("reference", Int), Slot::read("quanta", Int), Slot::read("remainder", Scalar)];
@@ -298,9 +303,17 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
         constants: CONSTANTS_OF_FILLS,
         ..Shader::new("contact/grid", "fill_slabs")
     };
-    const SLOTS: &'static [Slot] = &joined::<10>(
+    const SLOTS: &'static [Slot] = &joined::<11>(
         &PLACE,
-        &joined::<7>(&[Slot::read("slabs", Uint), Slot::read("faces", Uint), Slot::read("before", Int)], &GRID),
+        &joined::<8>(
+            &[
+                Slot::read("slabs", Uint),
+                Slot::read("faces", Uint),
+                Slot::read("before", Int),
+                Slot::row("face_boxes", Scalar, FACE_BOXES),
+            ],
+            &GRID,
+        ),
     );
 
     #[inline(always)]
@@ -315,17 +328,24 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
             period: grid.params.period,
         };
         let slabs = io.uints(slot!(Self::SLOTS, "slabs"));
+        let mut face_boxes = io.own::<L::Scalar>(slot!(Self::SLOTS, "face_boxes"));
         let reach = L::Scalar::from_f64(f64::from(grid.params.thread_radius + grid.params.skin));
         let zero = [L::Scalar::from_f64(0.0); 3];
         for item in items {
             let (first, count) = (slabs[SLAB * item] as usize, slabs[SLAB * item + 1] as usize);
             let origin = of_coded(surface.faces[FACE * first]).0;
             let mut bounds = Bounds::new();
-            for face in first..first + count {
-                let corners = surface.corners(face, [0, 0], origin, (zero, zero));
+            let face_boxes = face_boxes.item(0, item);
+            for place in 0..count {
+                let corners = surface.corners(first + place, [0, 0], origin, (zero, zero));
                 for a in 0..4 {
                     bounds.grow(&inverse, corners.current[a]);
                     bounds.moved.add(motion::<Self, _>(io, corners.nodes[a]));
+                }
+                for k in 0..3 {
+                    let [a, b, c, d] = [0, 1, 2, 3].map(|corner| corners.current[corner][k]);
+                    face_boxes[SLAB_FACES * k + place] = a.min(b).min(c.min(d));
+                    face_boxes[SLAB_FACES * (3 + k) + place] = a.max(b).max(c.max(d));
                 }
             }
             grid.put::<Self, PERIODIC>(io, item, origin, bounds, reach);

@@ -1,15 +1,24 @@
 //! Contact skin (Verlet skin): largest nodal speed, validity of positions and, with contact, the distance travelled since the
 //! last candidate check.
 //!
-//! A check is due once a node has travelled by [`SKIN_USED`] of the contact skin. It searches only where bodies have moved
-//! relative to each other: nodes store their displacements at the last full search, and candidates from that search stay valid
-//! as long as nothing within reach has moved by more than [`SKIN_APART`] relative to its carrier. Bodies that move with their
-//! surroundings, as in the clamp of a specimen, are not searched. A carrier searched since then is searched at every check,
-//! until there are enough of them for a full search to pay.
+//! Two [`Shares`] of the skin decide on checks and searches. A check is due once a node has travelled by the share `used`. It
+//! searches only where bodies have moved relative to each other: nodes store their displacements at the last full search, and
+//! candidates from that search stay valid as long as nothing within reach has moved by more than the share `apart` relative to
+//! its carrier. Bodies that move with their surroundings, as in the clamp of a specimen, are not searched. A carrier searched
+//! since then is searched at every check, until there are enough of them for a full search to pay.
 //!
-//! A pair in no list was farther apart than reach plus skin when the list was made. It has come closer by at most `SKIN_APART`
-//! until the last check, by as much again through the affine motion of a periodic cell, and by 2 × `SKIN_USED` since. The rest
-//! of the skin covers the travel of nodes before the next check.
+//! A pair in no list had a gap larger than the skin when the list was made. Since then the gap has closed by at most these
+//! shares of the skin:
+//!
+//! | cause | free scene | periodic cell |
+//! |---|---|---|
+//! | relative motion until the last check, `apart` | 0.4 | 0.125 |
+//! | affine motion of the cell until the last check, at most `apart`, or everything is searched | – | 0.125 |
+//! | travel of both sides since the last check, 2 `used` | 0.4 | 0.5 |
+//! | sum | 0.8 | 0.75 |
+//!
+//! The rest of the skin covers what nodes travel beyond `used` in a burst of steps, after which the check comes. A larger `apart`
+//! saves searches, which cost more than checks. A cell pays for it twice, so its share is smaller.
 
 use super::status;
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
@@ -23,10 +32,21 @@ use crate::kernel::vector::dot;
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
-/// Share of the contact skin that nodes may travel before a check.
-pub const SKIN_USED: f64 = 0.25;
-/// Share that bodies may have moved relative to each other since candidates were searched.
-pub const SKIN_APART: f64 = 0.5 * SKIN_USED;
+/// Shares of the contact skin that motion may use up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shares {
+    /// Share that nodes may travel before a check.
+    pub used: f64,
+    /// Share that bodies may have moved relative to each other since candidates were searched.
+    pub apart: f64,
+}
+
+impl Shares {
+    /// The shares of a periodic cell or of a free scene.
+    pub const fn new(periodic: bool) -> Self {
+        if periodic { Self { used: 0.25, apart: 0.125 } } else { Self { used: 0.2, apart: 0.4 } }
+    }
+}
 
 /// Constants shared with the twin.
 const CONSTANTS: &[&[Constant]] = &[&position::CONSTANTS, &status::CONSTANTS];

@@ -6,7 +6,7 @@ use super::nodes::Nodes;
 use super::surfaces::{Carried, Surfaces};
 use super::{Active, Capacity, ContactPoint, Tables};
 use crate::contact::found::NEVER;
-use crate::contact::skin::SKIN_APART;
+use crate::contact::skin::Shares;
 use crate::contact::{
     EMPTY, Params, candidates, grid, memory, pairs, penalty, slot_state, sums, surface, threads, tie,
 };
@@ -125,11 +125,19 @@ impl Search {
     }
 }
 
-/// Tables of faces.
+/// Tables of faces and their slabs, and the boxes of faces.
 #[derive(Clone, Copy)]
 struct Faces {
     slabs: Buffer,
     faces: Buffer,
+    face_boxes: Buffer,
+}
+
+impl Faces {
+    fn wires(&self) -> [(&'static str, Wire); 3] {
+        let &Self { slabs, faces, face_boxes } = self;
+        wires![slabs, faces, face_boxes]
+    }
 }
 
 /// Sums of contact forces and stiffness.
@@ -205,12 +213,13 @@ impl ContactScene<'_> {
     fn slabs(&self, b: &mut Builder, search: &Search, surfaces: &Surfaces, params: Params) -> Faces {
         let faces = b.indices("faces", surfaces.faces.clone());
         let slabs = b.indices("slabs", surfaces.slabs.clone());
-        let status = self.nodes.status;
-        let wires = [&self.place()[..], &search.wires(), &wires![slabs, faces, status]].concat();
-        let kernel = flagged!(grid::FillSlabs; self.tables.active.periodic);
         let count = surfaces.slabs.len() / grid::SLAB;
+        let tables = Faces { slabs, faces, face_boxes: b.scratch("face boxes", grid::FACE_BOXES * count) };
+        let status = self.nodes.status;
+        let wires = [&self.place()[..], &search.wires(), &tables.wires(), &wires![status]].concat();
+        let kernel = flagged!(grid::FillSlabs; self.tables.active.periodic);
         b.plan.search.push(Stage::new("yarns to grid", kernel, (count, 32), &wires, params));
-        Faces { slabs, faces }
+        tables
     }
 
     /// Puts threads into the grid, after the slabs of yarns. The stages that fill the grid may run concurrently.
@@ -257,8 +266,8 @@ impl ContactScene<'_> {
         let sums = b.scratch(names.sums, each * count);
 
         let &Nodes { reference, quanta, remainder, velocity, mass, status, .. } = self.nodes;
-        let searched = wires![carriers, nodes, points, slabs: tables.slabs, faces: tables.faces, near: (near, list)];
-        let wires = [&searched[..], &self.place(), &search.wires(), &wires![found_when: found, status]].concat();
+        let searched = wires![carriers, nodes, points, near: (near, list), found_when: found, status];
+        let wires = [&searched[..], &self.place(), &search.wires(), &tables.wires()].concat();
         let kernel = flagged!(candidates::Candidates; thread, periodic);
         let stage = Stage::new(names.search, kernel, (lists, 64), &wires, params);
         b.plan.search.push(Stage { waits, ..stage });
@@ -372,7 +381,7 @@ impl ContactScene<'_> {
             depth: depth.min(f64::from(f32::MAX)) as f32,
             state: slot_state(active.friction) as u32,
             // per axis, so that the same distance results in space
-            apart: quanta(SKIN_APART * self.chosen.skin_mm / libm::sqrt(3.0)) as u32,
+            apart: quanta(Shares::new(active.periodic).apart * self.chosen.skin_mm / libm::sqrt(3.0)) as u32,
         }
     }
 }

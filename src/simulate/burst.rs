@@ -2,7 +2,7 @@
 
 use super::look::Looked;
 use super::{AFFINE_REACH, BURST, CALM, FARTHEST, SPEED_MARGIN, Simulation, WINDOW, largest};
-use crate::contact::skin::{SKIN_APART, SKIN_USED};
+use crate::contact::skin::Shares;
 use crate::contact::status;
 use crate::error::Result;
 use crate::kernel::buffer::Initial;
@@ -44,16 +44,17 @@ impl Simulation {
         let affine = ((load.angle - self.gradient_at_search.angle).abs() + strained) * AFFINE_REACH;
         let contact = self.scene.effects.contact.as_ref().filter(|_| self.model.active.searches());
         let skin = contact.map_or(f64::INFINITY, |c| c.skin_mm);
-        let mut left = SKIN_USED * skin - travel - affine;
+        let Shares { used, apart } = Shares::new(self.model.active.periodic);
+        let mut left = used * skin - travel - affine;
         let found = self.model.buffers.found.into_iter().flatten();
         let all: usize = found.map(|found| self.model.plan.buffers[found.0].len).sum();
         let pays = self.searched >= all as u64;
-        if affine > SKIN_APART * skin || load.radius > self.gradient_at_search.radius || left < 0.0 && pays {
+        if affine > apart * skin || load.radius > self.gradient_at_search.radius || left < 0.0 && pays {
             self.search_all()?;
-            left = SKIN_USED * skin;
+            left = used * skin;
         } else if left < 0.0 {
             self.search()?;
-            left = SKIN_USED * skin - affine;
+            left = used * skin - affine;
         }
         // a float that is too large for an integer becomes the largest one
         let sure = (left.min(FARTHEST) / (SPEED_MARGIN * self.speed * self.dt)) as u64;

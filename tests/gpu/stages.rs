@@ -96,6 +96,7 @@ fn exception(model: &Model, buffer: Buffer) -> Option<Exception> {
         "hex corner forces" | "hex stiffness bounds" | "hex energies" | "hourglass energies" | "hex stress sums" => {
             Exception::Lanes(LANES)
         }
+        "face boxes" => Exception::Lanes(grid::SLAB_FACES),
         "touches of thread points" | "touches of yarn points" => Exception::Repeats(model.touch),
         "beam pair state" => Exception::Slots(model.slot_state),
         "line correction" => Exception::Planes(3),
