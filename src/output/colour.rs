@@ -4,6 +4,7 @@
 //! over blue and green to yellow, so that equal steps of a field look equal, also in greyscale print.
 
 use glam::Vec3;
+use std::sync::LazyLock;
 
 /// Linear RGB, 0 to 1.
 pub type Rgb = Vec3;
@@ -32,13 +33,23 @@ pub fn map(share: f32) -> Rgb {
     oklch(0.30 + 0.61 * t, 0.115 + 0.06 * (2.0 * t - 1.0).powi(2) * t, 300.0 - 192.0 * t)
 }
 
-/// Bytes of a linear colour in sRGB encoding.
-pub fn encode(colour: Rgb) -> [u8; 3] {
-    colour.to_array().map(|v| {
-        let v = v.clamp(0.0, 1.0);
+/// Number of equal steps of a linear value from 0 to 1 that differ in their bytes at most by one.
+const STEPS: u16 = u16::MAX;
+
+/// The byte in sRGB encoding at every step.
+static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let byte = |step: u16| {
+        let v = f32::from(step) / f32::from(STEPS);
         let v = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
         (v * 255.0).round() as u8
-    })
+    };
+    (0..=STEPS).map(byte).collect()
+});
+
+/// Bytes of a linear colour in sRGB encoding.
+pub fn encode(colour: Rgb) -> [u8; 3] {
+    let bytes = &*BYTES;
+    colour.to_array().map(|v| bytes[(v.clamp(0.0, 1.0) * f32::from(STEPS) + 0.5) as usize])
 }
 
 /// Colour of warp yarns: dark carbon.
@@ -102,6 +113,9 @@ mod tests {
     fn white_and_ends() {
         assert_eq!(encode(oklch(1.0, 0.0, 0.0)), [255, 255, 255]);
         assert_eq!(encode(Rgb::ZERO), [0, 0, 0]);
+        assert_eq!(encode(Rgb::new(-1.0, 2.0, f32::NAN)), [0, 255, 0]);
+        // the middle byte, by the formula of sRGB
+        assert_eq!(encode(Rgb::splat(((128.0_f32 / 255.0 + 0.055) / 1.055).powf(2.4))), [128; 3]);
         assert_eq!(map(-1.0), map(0.0));
         assert_eq!(map(f32::NAN), oklch(0.78, 0.0, 0.0));
     }

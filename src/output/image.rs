@@ -61,7 +61,8 @@ impl Image {
 
     /// Writes the image atomically.
     pub fn write_png(&self, path: &Path) -> Result<()> {
-        let bytes: Vec<u8> = self.pixels.par_iter().flat_map_iter(|&p| encode(p)).collect();
+        let mut bytes = vec![0; 3 * self.pixels.len()];
+        bytes.par_chunks_mut(3).zip(&self.pixels).for_each(|(bytes, pixel)| bytes.copy_from_slice(&encode(*pixel)));
         replace(path, |w| {
             let mut encoder = png::Encoder::new(w, self.width as u32, self.height as u32);
             encoder.set_color(png::ColorType::Rgb);

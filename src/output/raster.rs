@@ -1,4 +1,4 @@
-//! Draws a scene: an orthographic depth buffer with several samples per pixel, then deferred lighting, once for each surface
+//! Draws a scene: an orthographic depth buffer with several samples per pixel, then deferred lighting, once for each quad
 //! visible in a pixel.
 //!
 //! The light consists of a key light from the upper left with shadows marched through the depth buffer, a sky light occluded by
@@ -37,22 +37,21 @@ impl Clip {
     }
 }
 
-/// A triangle of a quad in a periodic image.
+/// A quad in a periodic image.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Source {
     quad: u32,
     shift: u16,
-    second: bool,
 }
 
-/// The surface visible at a sample, and its depth toward the viewer.
+/// What is visible at a sample: the number of a triangle, and its depth toward the viewer.
 #[derive(Clone, Copy)]
 struct Fragment {
     depth: f32,
-    source: Option<Source>,
+    triangle: u32,
 }
 
-const NOTHING: Fragment = Fragment { depth: f32::NEG_INFINITY, source: None };
+const NOTHING: Fragment = Fragment { depth: f32::NEG_INFINITY, triangle: u32::MAX };
 
 /// Direction of the key light, in the axes of the camera.
 const KEY: Vec3 = Vec3::new(-0.48, 0.54, 0.69);
@@ -74,26 +73,29 @@ pub fn draw(scene: &Scene, shifts: &[Vec3], camera: &Camera, clip: &Clip) -> Ima
     let mut buffer = vec![NOTHING; fine.width * fine.height];
     let mut bands = vec![Vec::new(); fine.height.div_ceil(BAND)];
     for (number, triangle) in triangles.iter().enumerate().filter(|(_, triangle)| triangle.rows[0] < triangle.rows[1]) {
-        bands[triangle.rows[0] / BAND..=(triangle.rows[1] - 1) / BAND].iter_mut().for_each(|band| band.push(number));
+        let bands = &mut bands[triangle.rows[0] / BAND..=(triangle.rows[1] - 1) / BAND];
+        bands.iter_mut().for_each(|band| band.push(number as u32));
     }
     buffer.par_chunks_mut(fine.width * BAND).zip(&bands).enumerate().for_each(|(band, (rows, own))| {
-        own.iter().for_each(|number| triangles[*number].fill(rows, band * BAND, &fine, clip));
+        own.iter().for_each(|number| triangles[*number as usize].fill(*number, rows, band * BAND, &fine, clip));
     });
-    let heights = Heights::of(&buffer, camera);
-    let mut image = Image::new(camera.width, camera.height, colour::background());
+    let (heights, lamps) = (Heights::of(&buffer, camera), Lamps::of(camera));
+    let (paper, calm) = (colour::background(), scene.legend.is_some());
+    let mut image = Image::new(camera.width, camera.height, paper);
     image.rows_mut().par_chunks_mut(camera.width).enumerate().for_each(|(y, row)| {
         for (x, pixel) in row.iter_mut().enumerate() {
             let samples: [[usize; 2]; FINER * FINER] =
                 std::array::from_fn(|i| [x * FINER + i % FINER, y * FINER + i / FINER]);
             let seen = samples.map(|[x, y]| buffer[y * fine.width + x]);
-            let sources = seen.map(|fragment| fragment.source);
+            let triangles = seen.map(|fragment| triangles.get(fragment.triangle as usize));
+            let sources = triangles.map(|triangle| triangle.map(|triangle| triangle.source));
             *pixel = Rgb::ZERO;
             for (i, source) in sources.iter().enumerate().filter(|(i, source)| !sources[..*i].contains(source)) {
                 let share = sources.iter().filter(|other| *other == source).count() as f32 / sources.len() as f32;
-                let colour = source.map_or(colour::background(), |source| {
-                    let (quad, shift) = (&scene.quads[source.quad as usize], shifts[usize::from(source.shift)]);
-                    let surface = Surface::at(quad, shift, source.second, &fine, samples[i]);
-                    surface.lit(camera, heights.light(x, y, seen[i].depth), scene.legend.is_some())
+                let colour = triangles[i].map_or(paper, |triangle| {
+                    let quad = &scene.quads[triangle.source.quad as usize];
+                    let surface = Surface::at(quad, triangle, lamps.toward, samples[i]);
+                    surface.lit(&lamps, heights.light(x, y, seen[i].depth), calm)
                 });
                 *pixel += colour * share;
             }
@@ -107,8 +109,8 @@ fn triangles(scene: &Scene, shifts: &[Vec3], camera: &Camera, clip: &Clip) -> Ve
     let of_quad = |s: usize, q: usize| {
         let corners = scene.quads[q].corners.map(|c| camera.project(c + shifts[s]));
         [false, true].into_iter().filter_map(move |second| {
-            let source = Source { quad: q as u32, shift: s as u16, second };
-            Triangle::new(camera, clip, halves(second).map(|i| corners[i]), source)
+            let source = Source { quad: q as u32, shift: s as u16 };
+            Triangle::new(camera, clip, halves(second).map(|i| corners[i]), (source, second))
         })
     };
     let of_image = |s| (0..scene.quads.len()).into_par_iter().flat_map_iter(move |q| of_quad(s, q));
@@ -155,6 +157,8 @@ type Plane = [f32; 3];
 /// A triangle on the screen.
 struct Triangle {
     source: Source,
+    /// Which half of its quad it is.
+    second: bool,
     /// Weights of the corners, and depth.
     weights: [Plane; 3],
     depth: Plane,
@@ -167,7 +171,7 @@ struct Triangle {
 
 impl Triangle {
     /// `None` if it has no area or is out of view.
-    fn new(camera: &Camera, clip: &Clip, corners: [Vec3; 3], source: Source) -> Option<Self> {
+    fn new(camera: &Camera, clip: &Clip, corners: [Vec3; 3], (source, second): (Source, bool)) -> Option<Self> {
         let reach = |k: usize, size: usize| {
             let (low, high) = corners.iter().fold((f32::MAX, f32::MIN), |(l, h), c| (l.min(c[k]), h.max(c[k])));
             (high > 0.0 && low < size as f32).then(|| [low.max(0.0) as usize, (high as usize + 1).min(size)])
@@ -176,7 +180,7 @@ impl Triangle {
         let weights = weights(corners)?;
         let depth = std::array::from_fn(|i| (0..3).map(|k| weights[k][i] * corners[k].z).sum());
         let cut = corners.iter().any(|c| !clip.shows(camera.plane(c.x, c.y, c.z)));
-        Some(Self { source, weights, depth, columns, rows, cut })
+        Some(Self { source, second, weights, depth, columns, rows, cut })
     }
 
     /// Number of samples tested.
@@ -185,8 +189,8 @@ impl Triangle {
         (right - left) as f32 * (down - up) as f32
     }
 
-    /// Draws it into rows of the depth buffer that start at row `top`.
-    fn fill(&self, rows: &mut [Fragment], top: usize, camera: &Camera, clip: &Clip) {
+    /// Draws it under its number into rows of the depth buffer that start at row `top`.
+    fn fill(&self, number: u32, rows: &mut [Fragment], top: usize, camera: &Camera, clip: &Clip) {
         let bottom = top + rows.len() / camera.width;
         for y in self.rows[0].max(top)..self.rows[1].min(bottom) {
             let row = &mut rows[(y - top) * camera.width..][..camera.width];
@@ -209,7 +213,7 @@ impl Triangle {
                 let px = x as f32 + 0.5;
                 let depth = slope * px + start;
                 if depth > row[x].depth && (!self.cut || clip.shows(camera.plane(px, py, depth))) {
-                    row[x] = Fragment { depth, source: Some(self.source) };
+                    row[x] = Fragment { depth, triangle: number };
                 }
             }
         }
@@ -227,6 +231,21 @@ fn weights(corners: [Vec3; 3]) -> Option<[Plane; 3]> {
     (whole.abs() > 1e-9).then(|| [edge(b, c), edge(c, a), edge(a, b)])
 }
 
+/// Unit vectors toward the viewer, toward the key light, and halfway between both.
+struct Lamps {
+    toward: Vec3,
+    key: Vec3,
+    half: Vec3,
+}
+
+impl Lamps {
+    fn of(camera: &Camera) -> Self {
+        let [right, up, toward] = camera.axes;
+        let key = (right * KEY.x + up * KEY.y + toward * KEY.z).normalize_or_zero();
+        Self { toward, key, half: (key + toward).normalize_or_zero() }
+    }
+}
+
 /// A visible point of a surface.
 struct Surface {
     normal: Vec3,
@@ -239,11 +258,11 @@ struct Surface {
 }
 
 impl Surface {
-    fn at(quad: &Quad, shift: Vec3, second: bool, camera: &Camera, [x, y]: [usize; 2]) -> Self {
-        let corners = halves(second);
-        let screen = corners.map(|i| camera.project(quad.corners[i] + shift));
+    /// The point of a triangle of a quad at a sample.
+    fn at(quad: &Quad, triangle: &Triangle, toward: Vec3, [x, y]: [usize; 2]) -> Self {
+        let corners = halves(triangle.second);
         let at = |[dx, dy, at]: Plane| dx * (x as f32 + 0.5) + dy * (y as f32 + 0.5) + at;
-        let w = weights(screen).map_or([1.0, 0.0, 0.0], |weights| weights.map(at));
+        let w = triangle.weights.map(at);
         let blend = |values: &[Vec3; 4]| {
             let part = |k: usize| values[corners[k]] * w[k];
             part(0) + part(1) + part(2)
@@ -258,26 +277,24 @@ impl Surface {
             colour: blend(&quad.colours),
             grain: blend(&quad.grain),
             kind: quad.kind,
-            cut: outward.dot(camera.axes[2]) < 0.0,
+            cut: outward.dot(toward) < 0.0,
         }
     }
 
     /// Lit colour: `sky` and `sun` are the visible shares of the lights; `calm` subdues patterns.
-    fn lit(&self, camera: &Camera, [sky, sun]: [f32; 2], calm: bool) -> Rgb {
-        let [right, up, toward] = camera.axes;
-        let key = (right * KEY.x + up * KEY.y + toward * KEY.z).normalize_or_zero();
+    fn lit(&self, &Lamps { toward, key, half }: &Lamps, [sky, sun]: [f32; 2], calm: bool) -> Rgb {
         if self.cut {
             return self.colour * (0.55 + 0.2 * sky);
         }
-        let (texture, gloss, power, normal) = match self.kind {
-            Kind::Yarn => (filaments(self.grain), 0.16, 24, relief(self.normal, toward)),
-            Kind::Thread => (twist(self.grain), 0.10, 12, self.normal),
+        let along = self.fibre.dot(half);
+        let across = (1.0 - along * along).max(0.0);
+        let (texture, gloss, lobe, normal) = match self.kind {
+            Kind::Yarn => (filaments(self.grain), 0.16, across.powi(24), relief(self.normal, toward)),
+            Kind::Thread => (twist(self.grain), 0.10, across.powi(12), self.normal),
         };
         // Where colours show values, the filament pattern stays in the background.
         let (texture, gloss) = if calm { (1.0 + 0.3 * (texture - 1.0), 0.2 * gloss) } else { (texture, gloss) };
-        let half = (key + toward).normalize_or_zero();
-        let along = self.fibre.dot(half);
-        let sheen = gloss * (1.0 - along * along).max(0.0).powi(power) * normal.dot(half).max(0.0).powi(6);
+        let sheen = gloss * lobe * normal.dot(half).max(0.0).powi(6);
         let dome = 0.5 + 0.5 * normal.dot(toward);
         let light = texture * (0.60 * sky * dome + 0.97 * sun * normal.dot(key).max(0.0));
         let shine = sheen * sun * texture * texture;
@@ -313,8 +330,12 @@ fn noise(x: f32, y: f32, cells: i32) -> f32 {
     let smooth = |t: f32| t * t * (3.0 - 2.0 * t);
     let [(i, u), (j, v)] = [x, y].map(whole);
     let (u, v) = (smooth(u), smooth(v));
-    let value = |i: i32, j: i32| chance(i, j.rem_euclid(cells)) as f32 / u32::MAX as f32;
-    let row = |j: i32| value(i, j) + u * (value(i + 1, j) - value(i, j));
+    let value = |i: i32, j: i32| chance(i, j) as f32 / u32::MAX as f32;
+    let row = |j: i32| {
+        // nearly all rows lie between the ends, where no division is needed
+        let j = if (0..cells).contains(&j) { j } else { j.rem_euclid(cells) };
+        value(i, j) + u * (value(i + 1, j) - value(i, j))
+    };
     row(j) + v * (row(j + 1) - row(j))
 }
 
@@ -339,7 +360,7 @@ struct Heights {
     values: Vec<f32>,
     width: usize,
     margin: usize,
-    /// For each rotation of the pattern: distance, mm, and offset in `values`, in every direction.
+    /// For each rotation of the pattern: inverse of the distance, 1/mm, and offset in `values`, in every direction.
     around: [[[(f32, isize); RINGS.len()]; DIRECTIONS]; TURNS],
     /// For each rotation: rise, mm, and offset in `values`, along the ray to the key light.
     towards: [[(f32, isize); STEPS]; TURNS],
@@ -371,7 +392,7 @@ impl Heights {
         let around = std::array::from_fn(|turn| {
             std::array::from_fn(|direction| {
                 let angle = std::f32::consts::TAU * (direction as f32 + turn as f32 / TURNS as f32) / DIRECTIONS as f32;
-                RINGS.map(|ring| (ring, place([ring * angle.cos(), ring * angle.sin()])))
+                RINGS.map(|ring| (1.0 / ring, place([ring * angle.cos(), ring * angle.sin()])))
             })
         });
         let flat = KEY.x.hypot(KEY.y);
@@ -392,7 +413,7 @@ impl Heights {
         let turn = chance(x as i32, y as i32) as usize % TURNS;
         let mut hidden = 0.0;
         for direction in &self.around[turn] {
-            let rise = |&(ring, away): &(f32, isize)| (height(away) - own - 0.01) / ring;
+            let rise = |&(inverse, away): &(f32, isize)| (height(away) - own - 0.01) * inverse;
             let steepest = direction.iter().map(rise).fold(0.0, f32::max).min(1.6);
             hidden += steepest / (1.0 + steepest);
         }
@@ -436,7 +457,9 @@ mod tests {
         quad.normals = [Vec3::NEG_Z; 4];
         let axes = Vec3::AXES;
         let camera = Camera { axes, centre: Vec3::new(2.0, 2.0, 0.0), scale: 10.0, width: 20, height: 20 };
-        let surface = Surface::at(&quad, Vec3::ZERO, false, &camera, [12, 12]);
-        assert!(surface.cut);
+        let clip = Clip { low: Vec2::ZERO, high: Vec2::splat(4.0) };
+        let corners = halves(false).map(|i| camera.project(quad.corners[i]));
+        let triangle = Triangle::new(&camera, &clip, corners, (Source { quad: 0, shift: 0 }, false)).unwrap();
+        assert!(Surface::at(&quad, &triangle, Vec3::Z, [12, 12]).cut);
     }
 }

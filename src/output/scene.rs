@@ -9,9 +9,13 @@ use crate::mesh::frame::{Field, Frame};
 use crate::mesh::{Block, Mesh, Ply, Seen, Thread};
 use glam::{DVec3, Vec3};
 
-/// Number of sides of a tube, and of pieces per beam.
+/// Number of sides of a tube, and of pieces per beam where it is bent.
 const SIDES: usize = 14;
 const PIECES: usize = 4;
+
+/// Rise of the thread over the chord of a piece, in radii, up to which pieces are drawn as one: about the rise of a round tube
+/// over one of its sides.
+const RISE: f32 = 0.025;
 
 /// Height of one turn of a thread's twist, mm.
 const TWIST: f32 = 0.45;
@@ -242,30 +246,48 @@ fn tube(quads: &mut Vec<Quad>, mesh: &Mesh, frame: &Frame, thread: &Thread, firs
         rings.push((std::array::from_fn(radial), run));
     }
     let radius = thread.radius as f32;
-    for k in 0..beams * PIECES {
-        let (beam, piece) = (k / PIECES, k % PIECES);
-        let colour = |end: usize| {
+    for beam in 0..beams {
+        let start = beam * PIECES;
+        let colour = |k: usize| {
             let Some(paint) = paint else { return colour::thread() };
             if let Some(field) = paint.beam {
                 return paint.colour(paint.value(field, first + beam));
             }
             let Some(field) = paint.node else { return colour::plain() };
             let [a, b] = thread.beam(beam).map(|seen| paint.value(field, seen.node));
-            paint.colour(a + (b - a) * (piece + end) as f64 / PIECES as f64)
+            paint.colour(a + (b - a) * (k - start) as f64 / PIECES as f64)
         };
-        for n in 0..SIDES {
-            let ends = [[0, n], [1, n], [1, n + 1], [0, n + 1]];
-            let radial = |[end, n]: [usize; 2]| rings[k + end].0[n % SIDES];
-            quads.push(Quad {
-                corners: ends.map(|e| curve[k + e[0]].0 + radial(e) * radius),
-                normals: ends.map(radial),
-                colours: ends.map(|e| colour(e[0])),
-                grain: ends
-                    .map(|[end, n]| Vec3::new(n as f32 / SIDES as f32, rings[k + end].1 / run, (run / TWIST).round())),
-                kind: Kind::Thread,
-            });
+        let step = straight(&curve[start..=start + PIECES], radius);
+        for k in (start..start + PIECES).step_by(step) {
+            let [from, to] = [k, k + step].map(colour);
+            for n in 0..SIDES {
+                let ends = [[k, n], [k + step, n], [k + step, n + 1], [k, n + 1]];
+                let radial = |[k, n]: [usize; 2]| rings[k].0[n % SIDES];
+                quads.push(Quad {
+                    corners: ends.map(|[k, n]| curve[k].0 + radial([k, n]) * radius),
+                    normals: ends.map(radial),
+                    colours: [from, to, to, from],
+                    grain: ends
+                        .map(|[k, n]| Vec3::new(n as f32 / SIDES as f32, rings[k].1 / run, (run / TWIST).round())),
+                    kind: Kind::Thread,
+                });
+            }
         }
     }
+}
+
+/// The largest number of pieces of a beam, given by the points and directions at their ends, that can be drawn as one.
+fn straight(curve: &[(Vec3, Vec3)], radius: f32) -> usize {
+    let can = |step: &usize| {
+        (0..PIECES).step_by(*step).all(|k| {
+            let [from, to] = [curve[k], curve[k + step]];
+            let rise = |i: usize| curve[k + i].0.distance(from.0.lerp(to.0, i as f32 / *step as f32));
+            // the outside of a bend by an angle α rises by the radius times α²/8 more
+            let more = 0.25 * (1.0 - from.1.dot(to.1));
+            more <= RISE && (1..*step).all(|i| rise(i) <= RISE * radius)
+        })
+    };
+    [PIECES, PIECES / 2].into_iter().find(can).unwrap_or(1)
 }
 
 /// Point and unit direction on the curve from `p[1]` (t = 0) to `p[2]` (t = 1).
@@ -298,8 +320,11 @@ mod tests {
         let frame = sample::frame(&mesh, [[1.0, 0.0], [0.0, 1.0]]);
         let scene = build(&mesh, &frame, None, None).unwrap();
         let faces = |b: &Block| 2 * b.slices * (b.columns + b.layers);
-        let wanted = mesh.blocks.iter().map(faces).sum::<usize>() + mesh.beams() * PIECES * SIDES;
-        assert_eq!(scene.quads.len(), wanted);
+        let of_yarns = mesh.blocks.iter().map(faces).sum::<usize>();
+        let of_threads = scene.quads.len() - of_yarns;
+        assert!(scene.quads[..of_yarns].iter().all(|quad| quad.kind == Kind::Yarn));
+        assert!(of_threads.is_multiple_of(SIDES) && of_threads >= mesh.beams() * SIDES);
+        assert!(of_threads < mesh.beams() * SIDES * PIECES, "where it is nearly straight, a beam is one piece");
         for quad in &scene.quads {
             let [a, b, c, d] = quad.corners;
             let across = (c - a).cross(d - b);
@@ -311,6 +336,21 @@ mod tests {
         for quad in scene.quads.iter().filter(|q| q.kind == Kind::Yarn && q.corners.iter().all(|c| c.z > 0.35)) {
             assert!(quad.normals.iter().all(|n| n.z > 0.9));
         }
+    }
+
+    #[test]
+    fn pieces_are_joined_as_far_as_they_are_straight() {
+        // an arc of a circle of radius 1: the rise over a chord is close to the square of its length over 8
+        let arc = |angle: f32| {
+            let at = |k: usize| (angle * k as f32 / PIECES as f32).sin_cos();
+            let point = |(s, c): (f32, f32)| (Vec3::new(s, c, 0.0), Vec3::new(c, -s, 0.0));
+            (0..=PIECES).map(|k| point(at(k))).collect::<Vec<_>>()
+        };
+        let radius = 0.4_f32.powi(2) / 8.0 / RISE;
+        assert_eq!([0.0, 0.38, 0.42, 0.76, 0.84].map(|angle| straight(&arc(angle), radius)), [4, 4, 2, 2, 1]);
+        // an arc that is short in radii, but turns
+        assert_eq!([0.42, 0.47, 0.94].map(|angle| straight(&arc(angle), 10.0)), [4, 2, 1]);
+        assert_eq!(straight(&[(Vec3::NAN, Vec3::NAN); PIECES + 1], radius), 1);
     }
 
     #[test]

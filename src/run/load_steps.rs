@@ -17,8 +17,10 @@ impl Run<'_> {
         self.keep();
         self.simulation.advance(0.0, |_| false)?;
         if self.frames.is_empty() {
-            self.write_frame("start")?;
+            // before there are rows: without a checkpoint they could not be resumed
             self.save(None)?;
+            self.writer.wait()?;
+            self.write_frame("start")?;
         }
         self.wait();
         for (number, (phase, step)) in phases.iter().zip(&self.loaded.case.steps).enumerate().skip(self.place.phase) {
@@ -45,6 +47,7 @@ impl Run<'_> {
                 }
                 self.started += watch();
                 self.tell(&bar, phase.name);
+                self.writer.check()?;
                 let [from, to] = [way(row - 1), way(row)];
                 for place in places.iter().filter(|place| (*place - from) * (*place - to) < 0.0 || **place == to) {
                     self.write_frame(&format!("{place}{unit}"))?;

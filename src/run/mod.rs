@@ -21,6 +21,7 @@ mod resume;
 mod rows;
 mod session;
 mod summary;
+mod writer;
 
 pub use check::check;
 pub use devices::devices;
@@ -56,7 +57,7 @@ pub struct Options {
     pub output: PathBuf,
     /// Scalar type; `None` to follow the case.
     pub precision: Option<Precision>,
-    /// Number of threads; `None` for all cores.
+    /// Number of threads that compute, besides one that writes files; `None` for all cores.
     pub threads: Option<usize>,
     /// The machine that runs the scene.
     pub machine: Machine,

@@ -183,7 +183,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Writes a checkpoint if the case wants checkpoints; `end` names the completed load step.
+    /// Gives a checkpoint to the writer if the case wants checkpoints; `end` names the completed load step.
     pub(super) fn save(&mut self, end: Option<&str>) -> Result<()> {
         if self.loaded.case.output.checkpoint_wall_s.is_none() {
             return Ok(());
@@ -192,7 +192,7 @@ impl Run<'_> {
         self.write_state(lengths, end)
     }
 
-    /// Writes a checkpoint of a run whose tables have these lengths.
+    /// Gives the writer a checkpoint of a run whose tables have these lengths.
     fn write_state(&mut self, mut lengths: Vec<u64>, end: Option<&str>) -> Result<()> {
         let mut record = Record::new();
         self.record(&mut lengths, &mut record);
@@ -201,7 +201,9 @@ impl Run<'_> {
         self.simulation.alive()?;
         let case = value(&self.loaded.case)?;
         let at = (self.simulation.step(), self.place.phase);
-        Checkpoint::new(case, at, [host, record.into_bytes()], buffers).write(&self.options.output, end)?;
+        let checkpoint = Checkpoint::new(case, at, [host, record.into_bytes()], buffers);
+        let (dir, end) = (self.options.output.clone(), end.map(str::to_owned));
+        self.writer.add(move || checkpoint.write(&dir, end.as_deref()))?;
         self.wait();
         Ok(())
     }
@@ -219,6 +221,8 @@ impl Run<'_> {
     /// Rollback: returns to an earlier state with its tables and frames after a guard stopped the run. Even if the process is
     /// killed meanwhile, the last checkpoint and the tables are consistent.
     pub(super) fn go_back(&mut self, guard: Guard) -> Result<()> {
+        // nothing is written while files are removed
+        self.writer.wait()?;
         let wall = self.wall();
         let said = guard.to_string();
         let own = self.retries.go_back(&mut self.simulation, guard)?;
@@ -229,6 +233,7 @@ impl Run<'_> {
         self.bar().println(format!("{said}; back to step {} with shorter steps", self.simulation.step()));
         if self.loaded.case.output.checkpoint_wall_s.is_some() {
             self.write_state(lengths.clone(), None)?;
+            self.writer.wait()?;
             checkpoint::remove_after(&self.options.output, self.simulation.step())?;
         }
         self.cut(&lengths)

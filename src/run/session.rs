@@ -4,9 +4,10 @@ use super::grips::Grips;
 use super::log::Log;
 use super::probes::{self, Probes};
 use super::resume::Start;
+use super::writer::Writer;
 use super::{FINISHED, Options, Outcome, simulation, write_case};
 use crate::error::{Error, Result};
-use crate::mesh::Ply;
+use crate::mesh::{Mesh, Ply};
 use crate::output::directory;
 use crate::output::lock::Lock;
 use crate::output::rows::{Contacts, History, Stitches, Yarn, Yarns};
@@ -81,8 +82,13 @@ pub(super) struct Run<'a> {
     pub(super) probes: Option<Probes>,
     /// Measures specific to the rig.
     pub(super) observer: Box<dyn Observer>,
+    /// Frames with their times, and pictures: those on disk, followed by those that the writer still has.
     pub(super) frames: Vec<(f64, String)>,
     pub(super) pictures: Vec<String>,
+    /// Writes frames, pictures and checkpoints.
+    pub(super) writer: Writer,
+    /// A copy of the mesh, to share with the writer.
+    pub(super) mesh: Arc<Mesh>,
     /// Number of the last load step without load, and the ratio of kinetic to total energy at its end.
     pub(super) rest: Option<(usize, f64)>,
     pub(super) worst_balance: f64,
@@ -144,6 +150,8 @@ impl<'a> Run<'a> {
             probes: Probes::of(&loaded.case.output.probes, mesh, &tables)?,
             observer: rigs::of(&loaded.case.domain).observer(&loaded.case, &simulation, &tables)?,
             retries: Retries::of(&simulation),
+            writer: Writer::default(),
+            mesh: Arc::new(mesh.clone()),
             simulation,
             stopped,
             frames: Vec::new(),
@@ -178,9 +186,14 @@ impl<'a> Run<'a> {
     /// Writes the summary and the closing lines, however the run ended.
     fn finish(mut self, result: Result<()>) -> Result<Outcome> {
         let interrupted = self.stopped.load(Ordering::Relaxed);
+        // a file that could not be written was due before whatever else ended the run
+        let result = self.writer.wait().and(result);
         if matches!(result, Err(Error::Guard(_))) {
             // shows the scene where it failed; a failure to write must not hide the guard
-            let _ = self.write_frame("stopped");
+            let _ = self.write_frame("stopped").and_then(|()| self.writer.wait());
+        }
+        if result.is_err() {
+            self.list_what_is_there();
         }
         let verdict = match &result {
             Ok(()) if interrupted => "interrupted".to_owned(),

@@ -1,7 +1,9 @@
 //! Injected faults: each is named, earlier output stays, and the run continues from its last checkpoint to the same files.
 //! Truncated and damaged checkpoints are in `checkpoint.rs`.
 
-use crate::common::program::{can_resume, contents, copy, failed, folder, hash, kill_after, program, ran, same};
+use crate::common::program::{
+    can_resume, contents, copy, failed, folder, hash, kill_after, program, ran, same, summary,
+};
 use crate::common::{advance, bare, block, neo_hookean, short_cell, start, with};
 use serde_json::{Value, json};
 use std::fs;
@@ -175,6 +177,46 @@ fn a_file_that_may_not_grow_stops_the_run_with_its_name() {
     let text = failed(&shell.output().unwrap(), 4);
     assert!(text.contains(".state: "), "{text}");
     goes_on(folder, "limited", &text);
+}
+
+/// Something is in the way of the frame that an interrupt writes, or of its picture, where the run ends.
+#[cfg(unix)]
+#[test]
+fn a_frame_that_cannot_be_written_is_an_error_even_at_the_end() {
+    let cube = block("cube", [2, 2, 2], [[0.0; 3], [1.0; 3]], 1e-9, neo_hookean(100.0, 0.3));
+    let folder = folder(&with(
+        bare(),
+        &[
+            ("/domain/mesh/blocks", json!([cube])),
+            ("/steps", json!([{ "hold": { "time_s": 5.0 } }])),
+            ("/output", json!({ "rows_per_step": 100_000 })),
+        ],
+    ));
+    let no_folder: fn(&Path) = |dir| {
+        fs::rename(dir.join("frames"), dir.join("moved")).unwrap();
+        fs::write(dir.join("frames"), "").unwrap();
+    };
+    let no_picture: fn(&Path) = |dir| fs::create_dir(dir.join("0001-interrupted.png")).unwrap();
+    for (name, obstacle, file, listed) in [
+        ("frame", no_folder, "frames/0001-interrupted.vtu", [0, 1]),
+        ("picture", no_picture, "0001-interrupted.png", [2, 1]),
+    ] {
+        let dir = folder.path().join(name);
+        let mut child = program(folder.path(), name, &[]).stderr(std::process::Stdio::piped()).spawn().unwrap();
+        // the last file of the first frame
+        while !dir.join("0000-start.png").exists() {
+            assert!(child.try_wait().unwrap().is_none(), "it has ended");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        obstacle(&dir);
+        let interrupt = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+        assert!(interrupt.unwrap().success());
+        let text = failed(&child.wait_with_output().unwrap(), 4);
+        assert!(text.contains(file), "{text}");
+        let summary = summary(&dir);
+        assert!(text.contains(summary["verdict"].as_str().unwrap()), "{text}");
+        assert_eq!(["frames", "pictures"].map(|list| summary[list].as_array().unwrap().len()), listed);
+    }
 }
 
 /// On a disk of its own, where the system lets a test mount one.

@@ -255,7 +255,9 @@ fn a_disk_that_takes_no_more_is_named() {
     let output = shell.arg(run.get_program()).args(run.get_args()).output().unwrap();
     let text = message(&output, 4);
     assert!(text.contains("frames/0001-1-pretension.vtu") && text.lines().count() == 1, "{text}");
-    assert_eq!(table(&dir.join("history.csv")).1.len(), 40, "the rows before it are whole");
+    // the next load step may go on until its own frame
+    let rows = table(&dir.join("history.csv")).1.len();
+    assert!((40..=80).contains(&rows), "{rows} rows");
     assert!(text.contains(summary(&dir)["verdict"].as_str().unwrap()), "{text}");
     let frames = vtu_read::read_collection(&dir.join("run.pvd")).unwrap();
     assert!(frames.len() == 1 && frames[0].is_file());
