@@ -29,6 +29,9 @@ pub const NONE: u32 = u32::MAX;
 /// Constants of nodal slots shared with the twins.
 pub const CONSTANTS: [Constant; 4] = constants![uint: SOLID, THREAD, BENT, NONE];
 
+/// Nodes assembled together, so that the loops over each axis fill registers.
+const BLOCK: usize = 64;
+
 /// Constants of the stage.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -94,9 +97,8 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();
         let first_thread = params.first_thread as usize;
-        let (solid, hexes) = (io.uints(slot!(Self::SLOTS, "solid_slots")), io.scalars(slot!(Self::SLOTS, "hex_force")));
-        let (thread, beams) =
-            (io.uints(slot!(Self::SLOTS, "thread_slots")), io.scalars(slot!(Self::SLOTS, "beam_force")));
+        let hexes = (io.uints(slot!(Self::SLOTS, "solid_slots")), io.scalars(slot!(Self::SLOTS, "hex_force")));
+        let beams = (io.uints(slot!(Self::SLOTS, "thread_slots")), io.scalars(slot!(Self::SLOTS, "beam_force")));
         let bends = BENDING.then(|| {
             let slots = io.uints(slot!(Self::SLOTS, "bend_slots", BENDING));
             (slots, io.scalars(slot!(Self::SLOTS, "bend_force", BENDING)))
@@ -105,81 +107,154 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
         let true_masses = if GRAVITY { io.scalars(slot!(Self::SLOTS, "true_mass", GRAVITY)) } else { &[] };
         let mut acceleration = io.own::<L::Scalar>(slot!(Self::SLOTS, "acceleration"));
         let mut inverse = io.own::<L::Scalar>(slot!(Self::SLOTS, "inverse_mass"));
-        let mut contact_force = CONTACT.then(|| io.own::<i32>(slot!(Self::SLOTS, "contact_force", CONTACT)));
-        let mut contact_stiffness = CONTACT.then(|| io.own::<i32>(slot!(Self::SLOTS, "contact_stiffness", CONTACT)));
-        let elements = if MASS_ADDED { io.scalars(slot!(Self::SLOTS, "element_stiffness", MASS_ADDED)) } else { &[] };
-        let mut added =
-            MASS_ADDED.then(|| io.own::<L::Scalar>(slot!(Self::SLOTS, "added_mass", CONTACT && MASS_ADDED)));
         let zero = L::Scalar::from_f64(0.0);
-        let real = |x: f32| L::Scalar::from_f64(f64::from(x));
-        let reach = real(params.mass_factor * 0.25) * io.row.dt * io.row.dt;
-        let least = real(params.mass_per_stiffness);
-        for node in items {
-            let mut force = [zero; 3];
-            if node < first_thread {
-                for &slot in &solid[SOLID * node..][..SOLID] {
-                    if slot == NONE {
-                        break;
-                    }
-                    let slot = &hexes[slot as usize..][..2 * LANES + 1];
-                    force = [force[0] + slot[0], force[1] + slot[LANES], force[2] + slot[2 * LANES]];
-                }
-            } else {
-                let slots = &thread[THREAD * (node - first_thread)..][..THREAD];
-                // the node is the first of one beam and the second of another
-                for (slot, sign) in slots.iter().zip([1.0, -1.0]) {
-                    if *slot != NONE {
-                        add(&mut force, &beams[3 * *slot as usize..][..3], sign);
-                    }
-                }
-                if let Some((bent, bends)) = bends {
-                    let slots = &bent[BENT * (node - first_thread)..][..BENT];
-                    for (slot, signs) in slots.iter().zip([[1.0, 0.0], [-1.0, 1.0], [0.0, -1.0]]) {
-                        if *slot != NONE {
-                            for (k, sign) in signs.into_iter().enumerate().filter(|(_, s)| *s != 0.0) {
-                                add(&mut force, &bends[6 * *slot as usize + 3 * k..][..3], sign);
-                            }
-                        }
-                    }
+        for first in items.clone().step_by(BLOCK) {
+            let count = BLOCK.min(items.end - first);
+            let mut force = [[zero; BLOCK]; 3];
+            for i in 0..count {
+                let node = first + i;
+                let gathered =
+                    if node < first_thread { solid(hexes, node) } else { thread(beams, bends, node - first_thread) };
+                for k in 0..3 {
+                    force[k][i] = gathered[k];
                 }
             }
-            if let Some(contact) = &mut contact_force {
-                for (k, force) in force.iter_mut().enumerate() {
-                    let quanta = contact.at(k, node);
-                    if *quanta != 0 {
-                        *force = *force + L::Scalar::from_i32(*quanta) * real(params.force_quantum);
-                        *quanta = 0;
-                    }
-                }
+            if CONTACT {
+                Self::add_contact(io, &params, (first, count), &mut force);
             }
             if GRAVITY {
-                for (force, gravity) in force.iter_mut().zip(params.gravity) {
-                    *force = *force + true_masses[node] * real(gravity);
+                let true_masses = &true_masses[first..][..count];
+                for k in 0..3 {
+                    let gravity = L::Scalar::from_f64(f64::from(params.gravity[k]));
+                    for i in 0..count {
+                        force[k][i] = force[k][i] + true_masses[i] * gravity;
+                    }
                 }
             }
-            let mut mass = masses[node];
-            if let Some(stiffness) = &mut contact_stiffness {
-                let quanta = stiffness.at(0, node);
-                let contact = L::Scalar::from_i32(*quanta) * real(params.stiffness_quantum);
-                *quanta = 0;
-                if let Some(added) = &mut added {
-                    let touching = if contact > zero { (contact + elements[node]) * reach } else { zero };
-                    let needed = touching.max(elements[node] * least) - mass;
-                    let added = added.at(0, node);
-                    *added = needed.max(*added * real(params.mass_memory));
-                    mass = mass + *added;
-                } else if contact > zero {
-                    let status = io.atomic_uints(slot!(Self::SLOTS, "status", CONTACT && !MASS_ADDED));
-                    raise(&status[CONTACT_RATE], contact / mass);
-                }
+            let mut mass = [zero; BLOCK];
+            mass[..count].copy_from_slice(&masses[first..][..count]);
+            if CONTACT {
+                Self::weigh_contact(io, &params, (first, count), &mut mass);
             }
-            let inverse_mass = L::Scalar::from_f64(1.0) / mass;
-            *inverse.at(0, node) = inverse_mass;
-            for (k, force) in force.into_iter().enumerate() {
-                *acceleration.at(k, node) = force * inverse_mass;
+            let mut inverse_mass = [zero; BLOCK];
+            for i in 0..count {
+                inverse_mass[i] = L::Scalar::from_f64(1.0) / mass[i];
+            }
+            inverse.slice(0, first, count).copy_from_slice(&inverse_mass[..count]);
+            for k in 0..3 {
+                let acceleration = acceleration.slice(k, first, count);
+                for i in 0..count {
+                    acceleration[i] = force[k][i] * inverse_mass[i];
+                }
             }
         }
     }
+}
+
+impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRAVITY: bool>
+    Assemble<CONTACT, MASS_ADDED, BENDING, GRAVITY>
+{
+    /// Adds the contact forces of nodes, and resets them.
+    #[inline(always)]
+    fn add_contact<R: Real>(io: &Io<R>, params: &Params, (first, count): (usize, usize), force: &mut [[R; BLOCK]; 3]) {
+        let mut contact = io.own::<i32>(slot!(Self::SLOTS, "contact_force", CONTACT));
+        let quantum = R::from_f64(f64::from(params.force_quantum));
+        for k in 0..3 {
+            let (quanta, force) = (contact.slice(k, first, count), &mut force[k]);
+            if is_zero(quanta) {
+                continue;
+            }
+            for i in 0..count {
+                let sum = force[i] + R::from_i32(quanta[i]) * quantum;
+                force[i] = if quanta[i] == 0 { force[i] } else { sum };
+            }
+            quanta.fill(0);
+        }
+    }
+
+    /// Resets the contact stiffness of nodes, and adds the mass that it calls for or reports its rate.
+    #[inline(always)]
+    fn weigh_contact<R: Real>(io: &Io<R>, params: &Params, (first, count): (usize, usize), mass: &mut [R; BLOCK]) {
+        let real = |x: f32| R::from_f64(f64::from(x));
+        let zero = R::from_f64(0.0);
+        let mut stiffness = io.own::<i32>(slot!(Self::SLOTS, "contact_stiffness", CONTACT));
+        let quanta = stiffness.slice(0, first, count);
+        let mut contact = [zero; BLOCK];
+        let touches = !is_zero(quanta);
+        if touches {
+            let quantum = real(params.stiffness_quantum);
+            for i in 0..count {
+                contact[i] = R::from_i32(quanta[i]) * quantum;
+            }
+            quanta.fill(0);
+        }
+        if MASS_ADDED {
+            let reach = real(params.mass_factor * 0.25) * io.row.dt * io.row.dt;
+            let (least, memory) = (real(params.mass_per_stiffness), real(params.mass_memory));
+            let elements = &io.scalars(slot!(Self::SLOTS, "element_stiffness", MASS_ADDED))[first..][..count];
+            let mut added = io.own::<R>(slot!(Self::SLOTS, "added_mass", CONTACT && MASS_ADDED));
+            let added = added.slice(0, first, count);
+            for i in 0..count {
+                let touching = if contact[i] > zero { (contact[i] + elements[i]) * reach } else { zero };
+                let needed = touching.max(elements[i] * least) - mass[i];
+                added[i] = needed.max(added[i] * memory);
+                mass[i] = mass[i] + added[i];
+            }
+        } else if touches {
+            let status = io.atomic_uints(slot!(Self::SLOTS, "status", CONTACT && !MASS_ADDED));
+            for i in 0..count {
+                if contact[i] > zero {
+                    raise(&status[CONTACT_RATE], contact[i] / mass[i]);
+                }
+            }
+        }
+    }
+}
+
+/// Whether all numbers are zero.
+#[inline(always)]
+fn is_zero(numbers: &[i32]) -> bool {
+    let mut bits = 0;
+    for number in numbers {
+        bits |= *number;
+    }
+    bits == 0
+}
+
+/// Force of hexahedra on a node of a solid: its slots, and forces in blocks of lanes.
+#[inline(always)]
+fn solid<R: Real>((slots, hexes): (&[u32], &[R]), node: usize) -> [R; 3] {
+    let mut force = [R::from_f64(0.0); 3];
+    for &slot in &slots[SOLID * node..][..SOLID] {
+        if slot == NONE {
+            break;
+        }
+        let slot = &hexes[slot as usize..][..2 * LANES + 1];
+        force = [force[0] + slot[0], force[1] + slot[LANES], force[2] + slot[2 * LANES]];
+    }
+    force
+}
+
+/// Force of beams and bends on a node of a thread.
+#[inline(always)]
+fn thread<R: Real>((slots, beams): (&[u32], &[R]), bends: Option<(&[u32], &[R])>, node: usize) -> [R; 3] {
+    let mut force = [R::from_f64(0.0); 3];
+    // the node is the first of one beam and the second of another
+    for (slot, sign) in slots[THREAD * node..][..THREAD].iter().zip([1.0, -1.0]) {
+        if *slot != NONE {
+            add(&mut force, &beams[3 * *slot as usize..][..3], sign);
+        }
+    }
+    if let Some((slots, bends)) = bends {
+        for (slot, signs) in slots[BENT * node..][..BENT].iter().zip([[1.0, 0.0], [-1.0, 1.0], [0.0, -1.0]]) {
+            if *slot != NONE {
+                for (k, sign) in signs.into_iter().enumerate().filter(|(_, s)| *s != 0.0) {
+                    add(&mut force, &bends[6 * *slot as usize + 3 * k..][..3], sign);
+                }
+            }
+        }
+    }
+    force
 }
 
 #[inline(always)]

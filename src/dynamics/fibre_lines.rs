@@ -11,16 +11,19 @@
 //! The fibre laws are logarithmic: at a stretch λ < 1 their stiffness is (1 − ln λ)/λ² times the stiffness at rest. k_s grows
 //! by λ⁻⁴, which is more.
 //!
-//! The sweep solves a group of up to sixteen lines at once, one line per lane. The WGSL twin gives each line a workgroup and
-//! solves the same system, bordered by its last row, by parallel cyclic reduction.
+//! Segments are computed along each line, and the systems of up to sixteen lines are solved at once, one per lane: those of a
+//! group, or of consecutive groups of one line, such as threads. The WGSL twin gives each line a workgroup and solves the same
+//! system, bordered by its last row, by parallel cyclic reduction.
 
+use super::tridiagonal::{BORDER, COUPLING, DIAGONAL, RIGHT, Systems};
 use crate::elements::{self, LANES};
+use crate::kernel::buffer::CacheLine;
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, Share, when};
-use crate::kernel::stage::{Io, Kernel};
+use crate::kernel::stage::{Io, Kernel, Scatter};
 use bytemuck::{Pod, Zeroable};
 use std::cell::RefCell;
 use std::ops::Range;
@@ -33,7 +36,7 @@ pub struct Group {
     pub first: u32,
     /// Number of lines, at most sixteen.
     pub lines: u32,
-    /// Nodes per line.
+    /// Nodes per line, at least two.
     pub stations: u32,
     /// 1 if the first node follows the last, else 0.
     pub closed: u32,
@@ -43,6 +46,8 @@ pub struct Group {
 
 /// Integers per group in the table.
 const GROUP: usize = size_of::<Group>() / 4;
+/// Segments computed together, so that the loops over them fill registers.
+const BLOCK: usize = 64;
 
 /// Constants of the stage.
 #[repr(C)]
@@ -69,19 +74,9 @@ const SLOTS: [Slot; 8] = [
 pub struct FibreLines<const PERIODIC: bool>;
 
 thread_local! {
-    /// Work space of a sweep; f64 for its alignment and size.
-    static SCRATCH: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
+    /// Work space of the systems and the directions of lines.
+    static SCRATCH: RefCell<Vec<CacheLine>> = const { RefCell::new(Vec::new()) };
 }
-
-/// Rows of work space per station.
-const DIRECTION: usize = 0;
-const RESPONSE: usize = 3;
-const INVERSE: usize = 6;
-const DIAGONAL: usize = 7;
-const COUPLING: usize = 8;
-const CORNER: usize = 9;
-const RIGHT: usize = 10;
-const ROWS: usize = 11;
 
 impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
     const SHADER: Shader = Shader {
@@ -96,94 +91,214 @@ impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let groups: &[Group] = bytemuck::cast_slice(io.uints(slot!(&SLOTS, "groups")));
+        let nodes = Nodes::new(io);
+        let mut correction = io.scatter(slot!(&SLOTS, "correction"));
+        let mut block = Block::new();
         // taken, not borrowed in a closure, because the closure would not be compiled for the instruction set
         let mut memory = SCRATCH.take();
-        for group in items {
-            let group = groups[group];
-            memory.resize(memory.len().max(ROWS * LANES * (group.stations as usize + 1)), 0.0);
-            let scratch: &mut [L::Scalar] = bytemuck::cast_slice_mut(&mut memory);
-            gather::<L, PERIODIC>(io, &group, scratch);
-            for lane in (0..group.lines as usize).step_by(L::WIDTH) {
-                solve::<L>(io, &group, &mut Sweep { scratch, lane });
+        for item in items {
+            let (mut lines, mut count) = ([Line::default(); LANES], 0);
+            for group in bundle(groups, item) {
+                for number in 0..group.lines as usize {
+                    lines[count] = group.line(number);
+                    count += 1;
+                }
             }
-            scatter(io, &group, scratch);
+            if count > 0 {
+                solve::<L, PERIODIC>(&nodes, &lines[..count], &mut memory, &mut block, &mut correction);
+            }
         }
         SCRATCH.set(memory);
     }
 }
 
-/// Index of a row of a station in the work space.
+/// The groups that an item solves: its own or, if it is the first of up to sixteen consecutive groups of one line, all of these.
 #[inline(always)]
-fn place(station: usize, row: usize) -> usize {
-    (station * ROWS + row) * LANES
+fn bundle(groups: &[Group], item: usize) -> &[Group] {
+    if groups[item].lines > 1 {
+        return &groups[item..][..1];
+    }
+    if !item.is_multiple_of(LANES) && groups[item - 1].lines == 1 {
+        return &[];
+    }
+    let most = (LANES - item % LANES).min(groups.len() - item);
+    let mut count = 1;
+    while count < most && groups[item + count].lines == 1 {
+        count += 1;
+    }
+    &groups[item..][..count]
 }
 
-/// Loads segment vectors, accelerations and inverse masses into the work space, one line per lane.
-#[inline(always)]
-fn gather<L: Lane, const PERIODIC: bool>(io: &Io<L::Scalar>, group: &Group, scratch: &mut [L::Scalar]) {
-    let reference = io.ints(slot!(&SLOTS, "reference"));
-    let (quanta, remainder) = (io.ints(slot!(&SLOTS, "quanta")), io.scalars(slot!(&SLOTS, "remainder")));
-    let acceleration = io.scalars(slot!(&SLOTS, "acceleration"));
-    let (inverse, stiffness) = (io.scalars(slot!(&SLOTS, "inverse_mass")), io.scalars(slot!(&SLOTS, "stiffness")));
-    let plane = inverse.len();
-    let n = group.stations as usize;
-    let g = &io.row.gradient;
-    let quantum = L::Scalar::from_f64(QUANTUM);
-    for lane in 0..group.lines as usize {
-        let first = group.first as usize + lane * n;
-        for i in 0..n {
-            let here = first + i;
-            let (next, shift) = match (i + 1 < n, group.closed == 1) {
-                (true, _) => (here + 1, [0, 0]),
-                (false, true) => (first, group.shift),
-                // an open line has no last segment: any other segment of nonzero length takes its place
-                (false, false) => (here - 1, [0, 0]),
-            };
-            let shift = if PERIODIC { [shift[0], shift[1], 0] } else { [0; 3] };
-            let rest: [L::Scalar; 3] = std::array::from_fn(|k| {
-                let d = reference[next + k * plane].wrapping_sub(reference[here + k * plane]).wrapping_add(shift[k]);
-                L::Scalar::from_i32(d) * quantum
-            });
-            let mut lengths = [L::Scalar::from_f64(0.0); 2];
-            for k in 0..3 {
-                let (a, b) = (next + k * plane, here + k * plane);
-                let w =
-                    L::Scalar::from_i32(quanta[a].wrapping_sub(quanta[b])) * quantum + (remainder[a] - remainder[b]);
-                let mut now = rest[k];
-                if PERIODIC {
-                    now = now + (g[k][0] * rest[0] + g[k][1] * rest[1] + g[k][2] * rest[2]);
-                }
-                now = now + w;
-                lengths = [lengths[0] + rest[k] * rest[k], lengths[1] + now * now];
-                scratch[place(i, DIRECTION + k) + lane] = now;
-                scratch[place(i, RESPONSE + k) + lane] = acceleration[b];
-            }
-            scratch[place(i, INVERSE) + lane] = inverse[here];
-            let shortened = (lengths[0] / lengths[1]).max(L::Scalar::from_f64(1.0));
-            scratch[place(i, DIAGONAL) + lane] = stiffness[here] * shortened * shortened;
+/// A line of consecutive nodes.
+#[derive(Clone, Copy, Default)]
+struct Line {
+    /// First node.
+    first: usize,
+    /// Number of nodes.
+    stations: usize,
+    /// Whether the first node follows the last, and its image shift then, in quanta.
+    closed: bool,
+    shift: [i32; 3],
+}
+
+impl Group {
+    /// A line of the group.
+    #[inline(always)]
+    fn line(&self, number: usize) -> Line {
+        let Self { first, stations, closed, shift, .. } = *self;
+        let stations = stations as usize;
+        Line {
+            first: first as usize + number * stations,
+            stations,
+            closed: closed == 1,
+            shift: [shift[0], shift[1], 0],
         }
     }
 }
 
-/// One register of lines in the work space.
-struct Sweep<'a, R> {
-    scratch: &'a mut [R],
-    lane: usize,
+/// What is known of the nodes, and constants of the step.
+struct Nodes<'a, R> {
+    reference: &'a [i32],
+    quanta: &'a [i32],
+    remainder: &'a [R],
+    acceleration: &'a [R],
+    inverse_mass: &'a [R],
+    stiffness: &'a [R],
+    /// F̄ − I.
+    gradient: &'a [[R; 3]; 3],
+    /// 1/(β dt²).
+    compliance: R,
 }
 
-impl<R: Real> Sweep<'_, R> {
+impl<'a, R: Real> Nodes<'a, R> {
     #[inline(always)]
-    fn get<L: Lane<Scalar = R>>(&self, station: usize, row: usize) -> L {
-        L::load(&self.scratch[place(station, row) + self.lane..])
+    fn new(io: &'a Io<R>) -> Self {
+        let Params { beta } = io.params();
+        let beta = R::from_f64(f64::from(beta));
+        Self {
+            reference: io.ints(slot!(&SLOTS, "reference")),
+            quanta: io.ints(slot!(&SLOTS, "quanta")),
+            remainder: io.scalars(slot!(&SLOTS, "remainder")),
+            acceleration: io.scalars(slot!(&SLOTS, "acceleration")),
+            inverse_mass: io.scalars(slot!(&SLOTS, "inverse_mass")),
+            stiffness: io.scalars(slot!(&SLOTS, "stiffness")),
+            gradient: &io.row.gradient,
+            compliance: R::from_f64(1.0) / (beta * io.row.dt * io.row.dt),
+        }
     }
+}
+
+/// Consecutive segments of a line. Differences are from the node where a segment starts to the node where it ends.
+struct Block<R> {
+    /// Differences of reference positions.
+    rest: [[R; BLOCK]; 3],
+    /// Differences of displacements.
+    moved: [[R; BLOCK]; 3],
+    /// Differences of accelerations.
+    jump: [[R; BLOCK]; 3],
+    /// Inverse masses of both nodes.
+    inverse_mass: [[R; BLOCK]; 2],
+    /// Stiffness at rest.
+    stiffness: [R; BLOCK],
+    /// Current directions, after that of the segment before.
+    direction: [[R; BLOCK + 1]; 3],
+    /// Columns of the system; the coupling is that of the segment before to a segment.
+    diagonal: [R; BLOCK],
+    right: [R; BLOCK],
+    coupling: [R; BLOCK],
+}
+
+impl<R: Real> Block<R> {
     #[inline(always)]
-    fn set<L: Lane<Scalar = R>>(&mut self, station: usize, row: usize, value: L) {
-        value.store(&mut self.scratch[place(station, row) + self.lane..]);
+    fn new() -> Self {
+        let row = [R::from_f64(0.0); BLOCK];
+        Self {
+            rest: [row; 3],
+            moved: [row; 3],
+            jump: [row; 3],
+            inverse_mass: [row; 2],
+            stiffness: row,
+            direction: [[R::from_f64(0.0); BLOCK + 1]; 3],
+            diagonal: row,
+            right: row,
+            coupling: row,
+        }
     }
+
+    /// Loads segments from nodes `start ..` to nodes `end ..` whose image is shifted, into places `at ..`.
     #[inline(always)]
-    fn vector<L: Lane<Scalar = R>>(&self, station: usize, row: usize) -> [L; 3] {
-        [self.get(station, row), self.get(station, row + 1), self.get(station, row + 2)]
+    fn load(&mut self, nodes: &Nodes<R>, [start, end]: [usize; 2], shift: [i32; 3], at: usize, count: usize) {
+        let plane = nodes.inverse_mass.len();
+        let quantum = R::from_f64(QUANTUM);
+        for k in 0..3 {
+            let (a, b) = (start + k * plane, end + k * plane);
+            let (from, to) = (&nodes.reference[a..][..count], &nodes.reference[b..][..count]);
+            let rest = &mut self.rest[k][at..][..count];
+            for i in 0..count {
+                rest[i] = R::from_i32(to[i].wrapping_sub(from[i]).wrapping_add(shift[k])) * quantum;
+            }
+            let (from, to) = (&nodes.quanta[a..][..count], &nodes.quanta[b..][..count]);
+            let (from_rest, to_rest) = (&nodes.remainder[a..][..count], &nodes.remainder[b..][..count]);
+            let moved = &mut self.moved[k][at..][..count];
+            for i in 0..count {
+                moved[i] = position::difference(to[i], to_rest[i], from[i], from_rest[i]);
+            }
+            let (from, to) = (&nodes.acceleration[a..][..count], &nodes.acceleration[b..][..count]);
+            let jump = &mut self.jump[k][at..][..count];
+            for i in 0..count {
+                jump[i] = to[i] - from[i];
+            }
+        }
+        self.inverse_mass[0][at..][..count].copy_from_slice(&nodes.inverse_mass[start..][..count]);
+        self.inverse_mass[1][at..][..count].copy_from_slice(&nodes.inverse_mass[end..][..count]);
+        self.stiffness[at..][..count].copy_from_slice(&nodes.stiffness[start..][..count]);
     }
+
+    /// Computes the directions and the columns of the first `count` segments.
+    #[inline(always)]
+    fn compute<L: Lane<Scalar = R>, const PERIODIC: bool>(&mut self, nodes: &Nodes<R>, count: usize) {
+        let one = L::new(1.0);
+        let compliance = L::splat(nodes.compliance);
+        for i in (0..count).step_by(L::WIDTH) {
+            let rest: [L; 3] = vector(&self.rest, i);
+            let moved: [L; 3] = vector(&self.moved, i);
+            let mut now = rest;
+            for k in 0..3 {
+                if PERIODIC {
+                    let g = &nodes.gradient[k];
+                    now[k] = now[k] + (L::splat(g[0]) * rest[0] + L::splat(g[1]) * rest[1] + L::splat(g[2]) * rest[2]);
+                }
+                now[k] = now[k] + moved[k];
+            }
+            let shortened = (square(rest) / square(now)).max(one);
+            let stiffness = L::load(&self.stiffness[i..]) * shortened * shortened;
+            let inverse_length = one / dot(now, now).sqrt();
+            let direction = [now[0] * inverse_length, now[1] * inverse_length, now[2] * inverse_length];
+            let right = -dot(direction, vector(&self.jump, i));
+            let [a, b] = &self.inverse_mass;
+            let diagonal = compliance / stiffness + L::load(&a[i..]) + L::load(&b[i..]);
+            for k in 0..3 {
+                direction[k].store(&mut self.direction[k][i + 1..]);
+            }
+            diagonal.store(&mut self.diagonal[i..]);
+            right.store(&mut self.right[i..]);
+        }
+        for i in (0..count).step_by(L::WIDTH) {
+            let cosine: L = dot(vector(&self.direction, i), vector(&self.direction, i + 1));
+            let coupling = -(cosine * L::load(&self.inverse_mass[0][i..]));
+            coupling.store(&mut self.coupling[i..]);
+        }
+    }
+}
+
+#[inline(always)]
+fn vector<L: Lane, const N: usize>(rows: &[[L::Scalar; N]; 3], at: usize) -> [L; 3] {
+    [L::load(&rows[0][at..]), L::load(&rows[1][at..]), L::load(&rows[2][at..])]
+}
+
+#[inline(always)]
+fn square<L: Lane>(a: [L; 3]) -> L {
+    a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
 }
 
 #[inline(always)]
@@ -191,110 +306,96 @@ fn dot<L: Lane>(a: [L; 3], b: [L; 3]) -> L {
     a[2].fma(b[2], a[1].fma(b[1], a[0] * b[0]))
 }
 
-/// Sets up and solves the systems of one register of lines; the corrections replace the accelerations in their rows.
+/// Solves the systems of up to sixteen lines and writes the corrections of their nodes.
 #[inline(always)]
-fn solve<L: Lane>(io: &Io<L::Scalar>, group: &Group, s: &mut Sweep<L::Scalar>) {
-    let Params { beta } = io.params();
-    let n = group.stations as usize;
-    let (zero, one) = (L::new(0.0), L::new(1.0));
-    let compliance =
-        L::splat(L::Scalar::from_f64(1.0) / (L::Scalar::from_f64(f64::from(beta)) * io.row.dt * io.row.dt));
-    for i in 0..n {
-        let next = (i + 1) % n;
-        let v: [L; 3] = s.vector(i, DIRECTION);
-        let inverse_length = one / dot(v, v).sqrt();
-        let d = [v[0] * inverse_length, v[1] * inverse_length, v[2] * inverse_length];
-        let (a, b): ([L; 3], [L; 3]) = (s.vector(i, RESPONSE), s.vector(next, RESPONSE));
-        let right = -dot(d, [b[0] - a[0], b[1] - a[1], b[2] - a[2]]);
-        let stiffness: L = s.get(i, DIAGONAL);
-        let diagonal = compliance / stiffness + s.get(i, INVERSE) + s.get(next, INVERSE);
-        for (k, d) in d.into_iter().enumerate() {
-            s.set(i, DIRECTION + k, d);
+fn solve<L: Lane, const PERIODIC: bool>(
+    nodes: &Nodes<L::Scalar>,
+    lines: &[Line],
+    memory: &mut Vec<CacheLine>,
+    block: &mut Block<L::Scalar>,
+    correction: &mut Scatter<L::Scalar>,
+) {
+    let (mut counts, mut longest) = ([0; LANES], 0);
+    for (count, line) in counts.iter_mut().zip(lines) {
+        *count = line.stations;
+        longest = longest.max(line.stations);
+    }
+    let space = Systems::space::<L>(lines.len(), longest);
+    let numbers = space + longest + 3 * longest * lines.len();
+    let needed = (numbers * size_of::<L::Scalar>()).div_ceil(size_of::<CacheLine>());
+    memory.resize(needed.max(memory.len()), CacheLine::zeroed());
+    let (systems, memory) = bytemuck::cast_slice_mut(memory).split_at_mut(space);
+    let (unknowns, directions) = memory.split_at_mut(longest);
+    let mut systems = Systems::new::<L>(systems, longest, &counts[..lines.len()]);
+    for (lane, line) in lines.iter().enumerate() {
+        let directions = &mut directions[3 * longest * lane..][..3 * longest];
+        set_up::<L, PERIODIC>(nodes, line, block, directions, &mut systems, lane);
+    }
+    systems.solve::<L>();
+    for (lane, line) in lines.iter().enumerate() {
+        let unknowns = &mut unknowns[..line.stations];
+        systems.solution(lane, unknowns);
+        correct(nodes, line, &directions[3 * longest * lane..][..3 * longest], unknowns, correction);
+    }
+}
+
+/// Computes the directions of a line's segments, in three planes, and its system.
+#[inline(always)]
+fn set_up<L: Lane, const PERIODIC: bool>(
+    nodes: &Nodes<L::Scalar>,
+    line: &Line,
+    block: &mut Block<L::Scalar>,
+    directions: &mut [L::Scalar],
+    systems: &mut Systems<L::Scalar>,
+    lane: usize,
+) {
+    let &Line { first, stations, closed, shift } = line;
+    let (last, plane) = (stations - 1, directions.len() / 3);
+    // an open line has no last segment: any other segment of nonzero length takes its place
+    let (follower, shift) = if closed { (first, shift) } else { (first + last - 1, [0; 3]) };
+    for at in (0..stations).step_by(BLOCK) {
+        let count = BLOCK.min(stations - at);
+        let inner = count.min(last - at);
+        block.load(nodes, [first + at, first + at + 1], [0; 3], 0, inner);
+        if inner < count {
+            block.load(nodes, [first + last, follower], shift, inner, 1);
         }
-        s.set(i, DIAGONAL, diagonal);
-        s.set(i, RIGHT, right);
-        s.set(i, CORNER, zero);
-    }
-    for i in 0..n {
-        let next = (i + 1) % n;
-        let (a, b): ([L; 3], [L; 3]) = (s.vector(i, DIRECTION), s.vector(next, DIRECTION));
-        let inverse: L = s.get(next, INVERSE);
-        s.set(i, COUPLING, -(dot(a, b) * inverse));
-    }
-    if group.closed == 0 {
-        // no last segment
-        s.set(n - 1, DIAGONAL, one);
-        s.set(n - 1, RIGHT, zero);
-        s.set(n - 1, COUPLING, zero);
-        s.set(n.saturating_sub(2), COUPLING, zero);
-    }
-    eliminate::<L>(n, s);
-    for i in 0..n {
-        let previous = (i + n - 1) % n;
-        let (a, b): ([L; 3], [L; 3]) = (s.vector(previous, DIRECTION), s.vector(i, DIRECTION));
-        let (p, q): (L, L) = (s.get(previous, RIGHT), s.get(i, RIGHT));
-        let inverse: L = s.get(i, INVERSE);
+        block.compute::<L, PERIODIC>(nodes, count);
         for k in 0..3 {
-            s.set(i, RESPONSE + k, (p * a[k] - q * b[k]) * inverse);
+            directions[k * plane + at..][..count].copy_from_slice(&block.direction[k][1..][..count]);
+            block.direction[k][0] = block.direction[k][count];
         }
+        systems.set(lane, DIAGONAL, at, &block.diagonal[..count]);
+        systems.set(lane, RIGHT, at, &block.right[..count]);
+        // no segment is before the first
+        let before = usize::from(at == 0);
+        systems.set(lane, COUPLING, at + before - 1, &block.coupling[before..count]);
+    }
+    let (zero, one) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(1.0));
+    if closed {
+        let [a, b] = [last, 0].map(|i| [directions[i], directions[plane + i], directions[2 * plane + i]]);
+        systems.set(lane, BORDER, 0, &[-(dot(a, b) * nodes.inverse_mass[first])]);
+    } else {
+        systems.set(lane, BORDER, 0, &[zero]);
+        systems.set(lane, DIAGONAL, last, &[one]);
+        systems.set(lane, RIGHT, last, &[zero]);
+        systems.set(lane, COUPLING, last - 1, &[zero]);
     }
 }
 
-/// Cyclic LDLᵀ with a bordered last row; the solution replaces the right side.
+/// Writes the corrections of a line's nodes.
 #[inline(always)]
-fn eliminate<L: Lane>(n: usize, s: &mut Sweep<L::Scalar>) {
-    let last = n - 1;
-    let corner: L = s.get(last, COUPLING);
-    s.set(0, CORNER, corner);
-    let mut last_diagonal: L = s.get(last, DIAGONAL);
-    let mut last_right: L = s.get(last, RIGHT);
-    for i in 0..last {
-        let mut g: L = s.get(i, CORNER);
-        if i + 1 == last {
-            g = g + s.get(i, COUPLING);
-            s.set(i, CORNER, g);
-        }
-        let inverse = L::new(1.0) / s.get(i, DIAGONAL);
-        s.set(i, DIAGONAL, inverse);
-        let right: L = s.get(i, RIGHT);
-        let border = g * inverse;
-        last_diagonal = last_diagonal - border * g;
-        last_right = last_right - border * right;
-        if i + 1 < last {
-            let e: L = s.get(i, COUPLING);
-            let l = e * inverse;
-            let (d, r): (L, L) = (s.get(i + 1, DIAGONAL), s.get(i + 1, RIGHT));
-            s.set(i + 1, DIAGONAL, d - l * e);
-            s.set(i + 1, RIGHT, r - l * right);
-            s.set(i + 1, CORNER, -(l * g));
-        }
-    }
-    let end = last_right / last_diagonal;
-    s.set(last, RIGHT, end);
-    for i in (0..last).rev() {
-        let mut r: L = s.get(i, RIGHT);
-        if i + 1 < last {
-            let e: L = s.get(i, COUPLING);
-            r = r - e * s.get(i + 1, RIGHT);
-        }
-        let g: L = s.get(i, CORNER);
-        r = r - g * end;
-        let inverse: L = s.get(i, DIAGONAL);
-        s.set(i, RIGHT, r * inverse);
-    }
-}
-
-/// Writes the corrections of a group's nodes.
-fn scatter<R: Real>(io: &Io<R>, group: &Group, scratch: &[R]) {
-    let mut correction = io.scatter::<R>(slot!(&SLOTS, "correction"));
-    let plane = io.scalars(slot!(&SLOTS, "inverse_mass")).len();
-    let n = group.stations as usize;
-    for lane in 0..group.lines as usize {
-        for i in 0..n {
-            for k in 0..3 {
-                let node = group.first as usize + lane * n + i;
-                correction.set(node + k * plane, scratch[place(i, RESPONSE + k) + lane]);
-            }
+fn correct<R: Real>(nodes: &Nodes<R>, line: &Line, directions: &[R], unknowns: &[R], correction: &mut Scatter<R>) {
+    let n = line.stations;
+    let (last, plane) = (n - 1, directions.len() / 3);
+    let inverse_mass = &nodes.inverse_mass[line.first..][..n];
+    let p = &unknowns[..n];
+    for k in 0..3 {
+        let d = &directions[k * plane..][..n];
+        let to = correction.slice(line.first + k * nodes.inverse_mass.len(), n);
+        to[0] = (p[last] * d[last] - p[0] * d[0]) * inverse_mass[0];
+        for i in 1..n {
+            to[i] = (p[i - 1] * d[i - 1] - p[i] * d[i]) * inverse_mass[i];
         }
     }
 }

@@ -6,3 +6,4 @@ pub mod fibre_lines;
 pub mod integrate;
 pub mod time_step;
 pub mod totals;
+pub mod tridiagonal;

@@ -47,9 +47,10 @@ pub enum Initial {
     Uint(Vec<u32>),
 }
 
+/// Memory aligned to cache lines.
 #[derive(Clone, Copy, Zeroable, Pod)]
 #[repr(C, align(64))]
-struct CacheLine([u8; 64]);
+pub(crate) struct CacheLine([u8; 64]);
 
 /// An array of one kind in host memory, aligned to cache lines.
 #[derive(Clone)]

@@ -407,6 +407,13 @@ impl<T: Pod> Scatter<'_, T> {
         // SAFETY: in range, and only this item touches this place.
         unsafe { *self.address.add(index) = value }
     }
+    /// Numbers `first .. first + count`, all of which only this item touches.
+    #[inline(always)]
+    pub fn slice(&mut self, first: usize, count: usize) -> &mut [T] {
+        assert!(first <= self.len && count <= self.len - first);
+        // SAFETY: in range, only this item touches these places, and the borrow of `self` keeps slices apart.
+        unsafe { std::slice::from_raw_parts_mut(self.address.add(first), count) }
+    }
 }
 
 /// Raises a shared maximum of non-negative numbers, stored as the bits of an f32.
