@@ -2,6 +2,7 @@
 //! force. Measures return plain values and write nothing.
 
 pub mod crossings;
+mod outline;
 pub mod shear;
 pub mod stitches;
 pub mod yarns;

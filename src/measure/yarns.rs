@@ -13,10 +13,10 @@
 //! Without shear an undeformed ply has the broadness p (its pitch); under trellis shear without slip it is p cos γ.
 
 use super::Spread;
+use super::outline::{self, Outline};
 use crate::error::Result;
 use crate::mesh::frame::Frame;
-use crate::mesh::{Block, Mesh, Ply, Seen};
-use glam::{DVec2, DVec3, Vec3Swizzles};
+use crate::mesh::{Block, Mesh, Ply};
 
 /// Sizes of one yarn at its stations, mm.
 #[derive(Debug, Clone)]
@@ -69,19 +69,10 @@ pub fn ply(yarns: &[Yarn], ply: Ply) -> Sizes {
 pub fn measure(mesh: &Mesh, frame: &Frame) -> Result<Vec<Yarn>> {
     frame.check(mesh)?;
     let outlines: Vec<Outline> = mesh.blocks.iter().map(|b| Outline::of(mesh, frame, b)).collect();
-    let reach = if mesh.period.is_some() { 2 } else { 0 };
-    let shifts: Vec<DVec2> = (-reach..=reach)
-        .flat_map(|i| (-reach..=reach).map(move |j| [i, j]))
-        .map(|image| DVec3::from(frame.shift(mesh.period.unwrap_or_default(), image)).xy())
-        .collect();
+    let shifts = outline::shifts(mesh, frame);
     let yarn = |(index, block): (usize, &Block)| {
         let outline = &outlines[index];
-        let neighbours: Vec<(&Outline, DVec2)> = (0..mesh.blocks.len())
-            .filter(|&other| mesh.blocks[other].ply == block.ply)
-            .flat_map(|other| shifts.iter().map(move |&shift| (other, shift)))
-            .filter(|&(other, shift)| other != index || shift != DVec2::ZERO)
-            .map(|(other, shift)| (&outlines[other], shift))
-            .collect();
+        let neighbours = outline::neighbours(mesh, &outlines, &shifts, index);
         let stations = if block.wrap.is_some() { 0..block.slices } else { 1..block.slices };
         let (width, gap): (Vec<f64>, Vec<f64>) =
             stations.clone().map(|s| (outline.width(s), outline.gap(s, &neighbours))).unzip();
@@ -100,87 +91,6 @@ pub fn measure(mesh: &Mesh, frame: &Frame) -> Result<Vec<Yarn>> {
 fn thickness(mesh: &Mesh, frame: &Frame, block: &Block, station: usize) -> f64 {
     let height = |column, layer| frame.position(mesh, block.node(station, column, layer))[2];
     (0..=block.columns).map(|c| (height(c, block.layers) - height(c, 0)).abs()).fold(f64::NAN, f64::max)
-}
-
-/// A yarn in plan view (along z): centreline and edges at slice boundaries 0 ..= slices, mm.
-struct Outline {
-    centre: Vec<DVec2>,
-    normal: Vec<DVec2>,
-    /// Outermost nodes on the −n and on the +n side.
-    edges: [Vec<DVec2>; 2],
-}
-
-impl Outline {
-    fn of(mesh: &Mesh, frame: &Frame, block: &Block) -> Self {
-        let place = |seen: Seen| DVec3::from(frame.position(mesh, seen)).xy();
-        let section = |s: usize| -> Vec<DVec2> {
-            let nodes = (0..=block.layers).flat_map(|k| (0..=block.columns).map(move |j| block.node(s, j, k)));
-            nodes.map(place).collect()
-        };
-        let sections: Vec<_> = (0..=block.slices).map(section).collect();
-        let centre: Vec<DVec2> = sections.iter().map(|s| s.iter().sum::<DVec2>() / s.len() as f64).collect();
-        // Across the seam of a closed yarn, the section before the first is the last but one, one period back.
-        let turn = centre[block.slices] - centre[0];
-        let tangent = |s: usize| {
-            let last = block.slices;
-            match block.wrap {
-                Some(_) if s == 0 || s == last => centre[1] - centre[last - 1] + turn,
-                _ => centre[(s + 1).min(last)] - centre[s.saturating_sub(1)],
-            }
-        };
-        let normal: Vec<DVec2> = (0..=block.slices).map(tangent).map(turned).collect();
-        let outermost = |sign: f64| {
-            let reach = |p: &DVec2, s: usize| sign * p.dot(normal[s]);
-            let outer = |s: usize| sections[s].iter().max_by(|a, b| reach(a, s).total_cmp(&reach(b, s)));
-            (0..=block.slices).map(|s| outer(s).copied().unwrap_or(centre[s])).collect()
-        };
-        Self { edges: [outermost(-1.0), outermost(1.0)], centre, normal }
-    }
-
-    fn width(&self, s: usize) -> f64 {
-        (self.edges[1][s] - self.edges[0][s]).dot(self.normal[s])
-    }
-
-    /// Gap from the +n edge at a station to the nearest facing edge beyond the centre of its own section.
-    fn gap(&self, s: usize, neighbours: &[(&Outline, DVec2)]) -> f64 {
-        let (edge, n) = (self.edges[1][s], self.normal[s]);
-        let least = (self.centre[s] - edge).dot(n);
-        let mut nearest = f64::NAN;
-        for (other, shift) in neighbours {
-            for (chain, side) in other.edges.iter().zip([1.0, -1.0]) {
-                let facing = |segment: usize| side * n.dot(other.normal[segment]) > 0.0;
-                if let Some((gap, segment)) = crossing(chain, edge - *shift, n, least)
-                    && facing(segment)
-                {
-                    nearest = gap.min(nearest);
-                }
-            }
-        }
-        nearest
-    }
-}
-
-/// Smallest distance above `least` from `start` along `n` at which the ray crosses a chain of points, and the crossed segment.
-fn crossing(chain: &[DVec2], start: DVec2, n: DVec2, least: f64) -> Option<(f64, usize)> {
-    let along = |p: DVec2| (p - start).perp_dot(n);
-    let across = |p: DVec2| (p - start).dot(n);
-    chain
-        .windows(2)
-        .enumerate()
-        .filter_map(|(i, ends)| {
-            let (a, b) = (along(ends[0]), along(ends[1]));
-            // The segment is closed with a margin, so that rounding does not lose the seam between two images of a chain.
-            let margin = 1e-9 * (b - a).abs();
-            let crosses = a.min(b) <= margin && a.max(b) >= -margin && margin > 0.0;
-            let distance = crosses.then(|| across(ends[0]) + (across(ends[1]) - across(ends[0])) * a / (a - b))?;
-            (distance > least).then_some((distance, i))
-        })
-        .min_by(|x, y| x.0.total_cmp(&y.0))
-}
-
-/// Unit vector at +90° to `v`.
-fn turned(v: DVec2) -> DVec2 {
-    v.perp() / v.x.hypot(v.y)
 }
 
 #[cfg(test)]

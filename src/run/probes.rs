@@ -33,7 +33,7 @@ impl Probes {
     /// Writes a row: mean displacement of the nodes of each probe from their given positions, including the deformation of the
     /// cell.
     pub(super) fn write(&mut self, simulation: &Simulation, degrees: f64) -> Result<()> {
-        let (frame, reference) = (simulation.frame(), &simulation.mesh().nodes);
+        let (frame, reference) = (simulation.shape(), &simulation.mesh().nodes);
         simulation.alive()?;
         let mut numbers = vec![simulation.time(), degrees, simulation.displacement()];
         for nodes in &self.nodes {

@@ -13,7 +13,7 @@ impl Run<'_> {
     pub(super) fn write_row(&mut self, phase: &str) -> Result<()> {
         let seen = match &self.yarns {
             Some(_) => {
-                let frame = self.simulation.frame();
+                let frame = self.simulation.shape();
                 self.simulation.alive()?;
                 let yarns = yarns::measure(self.simulation.mesh(), &frame)?;
                 Some((frame, yarns))

@@ -70,8 +70,8 @@ impl Simulation {
         self.load().motion * self.scene.reach()
     }
 
-    /// The deformed state, with the fields that pictures and ParaView show.
-    pub fn frame(&self) -> Frame {
+    /// The deformed state without fields, as measures need it.
+    pub fn shape(&self) -> Frame {
         let gradient = self.row(self.time, 1.0, 1.0).gradient;
         let f = [[1.0 + gradient[0][0], gradient[0][1]], [gradient[1][0], 1.0 + gradient[1][1]]];
         let positions = self
@@ -82,14 +82,19 @@ impl Simulation {
             .zip(self.fluctuations())
             .map(|(x, w)| [f[0][0] * x[0] + f[0][1] * x[1] + w[0], f[1][0] * x[0] + f[1][1] * x[1] + w[1], x[2] + w[2]])
             .collect();
-        let mut frame = Frame {
+        Frame {
             time: self.time,
             angle_deg: self.load().angle.to_degrees(),
             displacement_mm: self.displacement(),
             gradient: f,
             positions,
             ..Frame::default()
-        };
+        }
+    }
+
+    /// The deformed state, with the fields that pictures and ParaView show.
+    pub fn frame(&self) -> Frame {
+        let mut frame = self.shape();
         frame.hex_fields = self.hex_fields(&frame);
         frame.node_fields = self.contact_fields();
         let field = |name: &str, components, values| Field { name: name.into(), components, values };

@@ -190,7 +190,7 @@ impl Observer for Pulled {
     fn start(&mut self, simulation: &Simulation, _: &[Step]) -> Result<()> {
         let displacement = simulation.displacement();
         if let Some(crossed) = &self.crossings {
-            let frame = simulation.frame();
+            let frame = simulation.shape();
             simulation.alive()?;
             let yarns = yarns::measure(simulation.mesh(), &frame)?;
             self.before = Reading::of(crossed.means(&crossed.measure(simulation.mesh(), &frame, &yarns)?));

@@ -4,7 +4,7 @@ use crate::case::fabric::Fabric;
 use crate::error::Result;
 use crate::kernel::record::{Record, Recorded};
 use crate::measure::shear::{self, CellCurve};
-use crate::measure::yarns;
+use crate::measure::yarns::{self, Yarn};
 use crate::mesh::Ply;
 use crate::mesh::frame::Frame;
 use crate::output::appended::Appended;
@@ -40,9 +40,14 @@ pub(super) struct Sheared {
     curve: Vec<(f64, f64)>,
     /// Squared errors of the membrane forces along x and y, (N/mm)², summed over the rows of shear, and the number of rows.
     missed: [f64; 3],
-    /// Mean width, thickness and gap of warp and weft before shear, mm.
-    settled: Option<[[f64; 3]; 2]>,
+    /// Yarn sizes before shear.
+    settled: Option<Means>,
+    /// Step and yarn sizes of the last row, if that is before shear.
+    latest: Option<(u64, Means)>,
 }
+
+/// Mean width, thickness and gap of warp and weft, mm.
+type Means = [[f64; 3]; 2];
 
 impl Sheared {
     pub(super) fn of(fabric: &Fabric, simulation: &Simulation, tables: &Tables) -> Result<Self> {
@@ -60,6 +65,7 @@ impl Sheared {
             curve: Vec::new(),
             missed: [0.0; 3],
             settled: None,
+            latest: None,
         })
     }
 
@@ -72,11 +78,10 @@ impl Sheared {
 
     /// Yarn sizes before shear, for the closing lines.
     fn settle(&mut self, simulation: &Simulation) -> Result<()> {
-        let frame = simulation.frame();
+        let frame = simulation.shape();
         simulation.alive()?;
         let yarns = yarns::measure(simulation.mesh(), &frame)?;
-        let means = |p: yarns::Sizes| [p.width.mean, p.thickness.mean, p.gap.mean];
-        self.settled = Some([Ply::Warp, Ply::Weft].map(|ply| means(yarns::ply(&yarns, ply))));
+        self.settled = Some(means(&yarns));
         Ok(())
     }
 
@@ -129,6 +134,8 @@ impl Observer for Sheared {
             }
             self.missed[2] += 1.0;
         }
+        let yarns = seen.yarns.filter(|_| seen.phase != "shear");
+        self.latest = yarns.map(|(_, yarns)| (simulation.step(), means(yarns)));
         let [weft_stretch, warp_stretch] = simulation.stretch();
         let [weft_membrane, warp_membrane] = shear::membrane_forces(in_plane(stress), middle, self.area);
         let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = stress.map(|row| row.map(|p| p / self.area));
@@ -157,7 +164,16 @@ impl Observer for Sheared {
     }
 
     fn end_of_step(&mut self, simulation: &Simulation, step: &Step) -> Result<()> {
-        if matches!(step, Step::Shear { .. }) { Ok(()) } else { self.settle(simulation) }
+        if matches!(step, Step::Shear { .. }) {
+            return Ok(());
+        }
+        match self.latest {
+            Some((step, means)) if step == simulation.step() => {
+                self.settled = Some(means);
+                Ok(())
+            }
+            _ => self.settle(simulation),
+        }
     }
 
     fn frame(&mut self, simulation: &Simulation, frame: &mut Frame, dir: &Path, name: &str) -> Result<()> {
@@ -174,7 +190,7 @@ impl Observer for Sheared {
     }
 
     fn record(&mut self, record: &mut Record) {
-        let Self { crossings, force, curve, missed, settled, area: _, stress: _, measured: _ } = self;
+        let Self { crossings, force, curve, missed, settled, area: _, stress: _, measured: _, latest: _ } = self;
         if let Some(crossed) = crossings {
             crossed.maps.record(record);
         }
@@ -230,6 +246,11 @@ impl Observer for Sheared {
         );
         t
     }
+}
+
+fn means(yarns: &[Yarn]) -> Means {
+    let means = |p: yarns::Sizes| [p.width.mean, p.thickness.mean, p.gap.mean];
+    [Ply::Warp, Ply::Weft].map(|ply| means(yarns::ply(yarns, ply)))
 }
 
 /// The in-plane components.
