@@ -156,6 +156,7 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
                     let gravity = L::Scalar::from_f64(f64::from(params.gravity[k]));
                     let (v, q) = (velocity.slice(k, first, count), quanta.slice(k, first, count));
                     let r = remainder.slice(k, first, count);
+                    let mut new = [zero; BLOCK];
                     for i in 0..count {
                         let mut a = a[i];
                         let mut virtual_force = zero;
@@ -166,9 +167,8 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
                         if MASS_ADDED {
                             virtual_force = virtual_force - extra[i] * a;
                         }
-                        let new = if DAMPING { v[i] * keep + a * gain } else { v[i] + a * gain };
-                        let mean = half * (v[i] + new);
-                        v[i] = new;
+                        new[i] = if DAMPING { v[i] * keep + a * gain } else { v[i] + a * gain };
+                        let mean = half * (v[i] + new[i]);
                         if DAMPING {
                             damped[i] = damped[i] + mass[i] * damping * mean * mean * row.dt_mid;
                         }
@@ -178,7 +178,10 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
                         if GRAVITY {
                             fallen[i] = fallen[i] + heavy[i] * gravity * mean * row.dt_mid;
                         }
-                        (q[i], r[i]) = carry(q[i], r[i] + new * row.dt);
+                    }
+                    v.copy_from_slice(&new[..count]);
+                    for i in 0..count {
+                        (q[i], r[i]) = carry(q[i], r[i] + new[i] * row.dt);
                     }
                 }
                 let works = [(damped_plane, damped), (inertia_plane, inertia), (fallen_plane, fallen)];

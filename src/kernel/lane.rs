@@ -78,7 +78,7 @@ pub trait Real: Lane<Scalar = Self> + Pod + Send + Sync + PartialOrd + Default {
     fn from_f64(x: f64) -> Self;
     fn to_f64(self) -> f64;
     fn from_i32(x: i32) -> Self;
-    /// Nearest whole number, saturating.
+    /// Nearest whole number, within ± (2³¹ − 128), the largest one that both precisions and an i32 hold.
     fn to_i32(self) -> i32;
     fn is_finite(self) -> bool;
     /// Runs `work` on the registers of an instruction set.
@@ -278,6 +278,8 @@ macro_rules! register {
     };
 }
 
+/// 2³¹ − 128.
+const MOST_I32: f64 = 2_147_483_520.0;
 /// Adding and subtracting 1.5 · 2^(mantissa bits) rounds to a whole number.
 const MAGIC_F32: f32 = 12_582_912.0;
 const MAGIC_F64: f64 = 6_755_399_441_055_744.0;
@@ -402,8 +404,11 @@ macro_rules! scalar {
             }
             #[inline(always)]
             fn to_i32(self) -> i32 {
-                // the magic constant rounds to even on every instruction set; the cast saturates
-                if self.abs() < 4e6 { self.round() as i32 } else { self as i32 }
+                // the magic constant rounds to even on every instruction set
+                let whole = if self.abs() < 4e6 { self.round() } else { self };
+                let within = Lane::min(Lane::max(whole, -MOST_I32 as $scalar), MOST_I32 as $scalar);
+                // SAFETY: the number is within the range of an i32. A checked cast would not be done in registers.
+                unsafe { within.to_int_unchecked() }
             }
             #[inline(always)]
             fn is_finite(self) -> bool {
