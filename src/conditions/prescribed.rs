@@ -97,8 +97,11 @@ impl Kernel for Hold {
         let mut correction = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "correction"));
         let plane = correction.len() / 3;
         for item in items {
-            for k in (0..3).filter(|k| nodes[2 * item + 1] >> k & 1 == 1) {
-                correction.set(nodes[2 * item] as usize + k * plane, L::Scalar::from_f64(0.0));
+            let (node, mask) = (nodes[2 * item] as usize, nodes[2 * item + 1]);
+            for k in 0..3 {
+                if mask >> k & 1 == 1 {
+                    correction.set(node + k * plane, L::Scalar::from_f64(0.0));
+                }
             }
         }
     }

@@ -45,6 +45,15 @@ pub fn shares(before: f64, behind: f64) -> [f64; 2] {
     [rise / before, rise / behind]
 }
 
+/// Both ends of a piece from the first node of its beam: from the vectors of the previous beam, its own and the next, and from
+/// their shares.
+#[inline(always)]
+fn offset<R: Real>(before: Vector<R>, own: Vector<R>, behind: Vector<R>, shares: [R; 4]) -> [Vector<R>; 2] {
+    let first = sub(scale(before, shares[0]), scale(own, shares[1]));
+    let second = sub(scale(own, shares[2]), scale(behind, shares[3]));
+    [first, add(own, second)]
+}
+
 impl<R: Real> OffsetLines<'_, R> {
     /// The previous and next beams, and the four shares.
     #[inline(always)]
@@ -64,14 +73,11 @@ impl<R: Real> OffsetLines<'_, R> {
         gradient: &[[R; 3]; 3],
     ) -> Piece<R> {
         let (beside, shares) = self.beside(beam);
-        let vector = |beam: usize| beam2::vector::<_, PERIODIC>(beams, ends, beam, w, gradient);
-        let (before, own, behind) = (vector(beside[0]), vector(beam), vector(beside[1]));
-        let ends = |before, own, behind| {
-            let first = sub(scale(before, shares[0]), scale(own, shares[1]));
-            let second = sub(scale(own, shares[2]), scale(behind, shares[3]));
-            [first, add(own, second)]
-        };
-        let (rest, change) = (ends(before.0, own.0, behind.0), ends(before.1, own.1, behind.1));
+        let before = beam2::vector::<_, PERIODIC>(beams, ends, beside[0], w, gradient);
+        let own = beam2::vector::<_, PERIODIC>(beams, ends, beam, w, gradient);
+        let behind = beam2::vector::<_, PERIODIC>(beams, ends, beside[1], w, gradient);
+        let rest = offset(before.0, own.0, behind.0, shares);
+        let change = offset(before.1, own.1, behind.1, shares);
         Piece { rest, now: [add(rest[0], change[0]), add(rest[1], change[1])] }
     }
 
@@ -79,7 +85,8 @@ impl<R: Real> OffsetLines<'_, R> {
     #[inline(always)]
     pub fn nodes(&self, ends: &[u32], beam: usize) -> [usize; 4] {
         let [before, behind] = self.beside(beam).0;
-        [ends[2 * before], ends[2 * beam], ends[2 * beam + 1], ends[2 * behind + 1]].map(|node| node as usize)
+        let (first, second) = (ends[2 * beam] as usize, ends[2 * beam + 1] as usize);
+        [ends[2 * before] as usize, first, second, ends[2 * behind + 1] as usize]
     }
 
     /// Weights of these nodes at both ends of the piece.
@@ -102,15 +109,19 @@ impl<R: Real> OffsetLines<'_, R> {
     /// from end to end.
     #[inline(always)]
     pub fn are_near(&self, a: usize, b: usize, image: [i32; 2], arc: R) -> bool {
-        let of = |beam: usize| &self.neighbours[NEIGHBOURS * beam..][..NEIGHBOURS];
-        let place = |beam: usize| &self.shares[SHARES * beam + ARC..][..3];
-        let (chain, p, q) = (of(a), place(a), place(b));
+        let chain = &self.neighbours[NEIGHBOURS * a..][..NEIGHBOURS];
+        if chain[2] != self.neighbours[NEIGHBOURS * b + 2] {
+            return false;
+        }
+        let (p, q) = (&self.shares[SHARES * a + ARC..][..3], &self.shares[SHARES * b + ARC..][..3]);
         let reach = arc + R::from_f64(0.5) * (p[1] + q[1]);
-        let after = |turns: i32| {
-            let there = [turns.wrapping_mul(chain[3] as i32), turns.wrapping_mul(chain[4] as i32)];
-            there == image && (q[0] - p[0] + R::from_i32(turns) * p[2]).abs() < reach
-        };
-        chain[2] == of(b)[2] && (after(0) || after(1) || after(-1))
+        for turns in -1..2 {
+            let there = [turns * chain[3] as i32, turns * chain[4] as i32];
+            if there == image && (q[0] - p[0] + R::from_i32(turns) * p[2]).abs() < reach {
+                return true;
+            }
+        }
+        false
     }
 
     /// The beam before another beam in an image, and its image; `None` at the start of a thread.

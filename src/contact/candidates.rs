@@ -9,7 +9,7 @@
 //! body. Carriers keep their lists if nothing near them has moved relative to them (see [`super::skin`]).
 
 use super::grid::{
-    BOX, FACE_BOXES, Moved, ROUNDING, SLAB, SLAB_FACES, absolute, cell_index, cells, has_moved, inverse, motion,
+    BOX, FACE_BOXES, Motion, Moved, ROUNDING, SLAB, SLAB_FACES, absolute, cell_index, cells, has_moved, inverse,
     pull_back, stretch,
 };
 use super::surface::{self, CARRIED, FACE, POINT, Surface, entry, of_coded};
@@ -59,9 +59,11 @@ pub struct Candidates<const THREAD: bool, const PERIODIC: bool>;
 
 /// Bounds of the motion of a carrier's nodes since the last full search, quanta.
 #[inline(always)]
-fn moved<K: Kernel, R: Real, const N: usize>(io: &Io<R>, coded: [u32; N]) -> ([R; 3], [R; 3]) {
+fn moved<R: Real, const N: usize>(motion: &Motion<R>, coded: &[u32; N]) -> ([R; 3], [R; 3]) {
     let mut moved = Moved::none();
-    coded.iter().for_each(|node| moved.add(motion::<K, _>(io, of_coded(*node).0)));
+    for node in coded {
+        moved.add(motion, of_coded(*node).0);
+    }
     moved.bounds()
 }
 
@@ -77,14 +79,24 @@ struct Place<R> {
 }
 
 impl<R: Real> Place<R> {
-    /// The box of points at `offsets` from a node at `base` in the pulled-back plane and at a height.
+    /// The box of points carried by coded nodes, given by their rows of [`POINT`] numbers; the first node is at `base` in the
+    /// pulled-back plane and at a height.
     #[inline(always)]
-    fn new(offsets: impl Iterator<Item = Vector<R>>, (base, height): ([R; 2], R), inverse: &[[R; 2]; 2]) -> Self {
+    fn new<const N: usize, const PERIODIC: bool>(
+        surface: &Surface<R, PERIODIC>,
+        coded: [u32; N],
+        points: &[R],
+        (base, height): ([R; 2], R),
+        inverse: &[[R; 2]; 2],
+    ) -> Self {
         let half = R::from_f64(0.5);
         let far = R::from_f64(1e9);
         let (mut low, mut high) = ([far; 3], [-far; 3]);
         let (mut from, mut to) = ([far; 2], [-far; 2]);
-        for offset in offsets {
+        for point in 0..points.len() / POINT {
+            let mut weights = [half; N];
+            weights.copy_from_slice(&points[POINT * point..][..N]);
+            let offset = surface.point(coded, weights).1;
             for k in 0..3 {
                 (low[k], high[k]) = (low[k].min(offset[k]), high[k].max(offset[k]));
             }
@@ -96,8 +108,8 @@ impl<R: Real> Place<R> {
         Self {
             low,
             high,
-            middle: [0, 1].map(|k| base[k] + half * (from[k] + to[k])),
-            half: [0, 1].map(|k| half * (to[k] - from[k])),
+            middle: [base[0] + half * (from[0] + to[0]), base[1] + half * (from[1] + to[1])],
+            half: [half * (to[0] - from[0]), half * (to[1] - from[1])],
             heights: [height + low[2], height + high[2]],
         }
     }
@@ -137,7 +149,11 @@ impl<R: Real> Place<R> {
             }
         }
         let most = reach + R::from_f64(ROUNDING);
-        squares.map(|square| square <= most * most)
+        let mut are_near = [false; SLAB_FACES];
+        for face in 0..SLAB_FACES {
+            are_near[face] = squares[face] <= most * most;
+        }
+        are_near
     }
 }
 
@@ -212,81 +228,178 @@ impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PER
     }
 }
 
+/// What the carriers of a chunk read.
+struct Search<'a, R, const PERIODIC: bool> {
+    surface: Surface<'a, R, PERIODIC>,
+    params: Params,
+    slabs: &'a [u32],
+    counts: &'a [u32],
+    lists: &'a [u32],
+    boxes: &'a [R],
+    face_boxes: &'a [R],
+    stretch: [R; 2],
+    /// Periods, mm; 0 for a free scene.
+    period: [R; 2],
+}
+
+/// A carrier: the extent of its points, its first node, the reach of its points, mm, and its own body.
+struct Carrier<R> {
+    place: Place<R>,
+    base: usize,
+    reach: R,
+    own: u32,
+}
+
+/// Cells from the first to the last along x and y.
+type Cells = [(i32, i32); 2];
+
+impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
+    /// The cells of a carrier.
+    #[inline(always)]
+    fn cells(&self, place: &Place<R>) -> Cells {
+        let mut ranges = [(0, 0); 2];
+        for k in 0..2 {
+            let (low, high) = (place.middle[k] - place.half[k], place.middle[k] + place.half[k]);
+            ranges[k] = cells::<_, PERIODIC>(&self.params, k, low, high);
+        }
+        ranges
+    }
+
+    /// Whether a cell is full.
+    #[inline(always)]
+    fn overflows(&self, [xs, ys]: Cells) -> bool {
+        for y in ys.0..=ys.1 {
+            for x in xs.0..=xs.1 {
+                if self.counts[cell_index(&self.params, x, y)] > self.params.capacity {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// The items of a cell.
+    #[inline(always)]
+    fn items(&self, x: i32, y: i32) -> &[u32] {
+        let cell = cell_index(&self.params, x, y);
+        &self.lists[cell * self.params.capacity as usize..][..self.counts[cell] as usize]
+    }
+
+    /// The image of a slab of another body within reach of a carrier.
+    #[inline(always)]
+    fn image_of(&self, carrier: &Carrier<R>, slab: usize) -> Option<[i32; 2]> {
+        let bounds = &self.boxes[BOX * slab..][..BOX];
+        let image = carrier.place.image_within(bounds, carrier.reach, self.stretch, self.period)?;
+        let is_own = self.surface.marks(self.slabs[SLAB * slab] as usize) >> 10 == carrier.own;
+        if is_own { None } else { Some(image) }
+    }
+
+    /// Whether a slab within reach has moved relative to a carrier whose nodes have moved from `least` to `greatest`.
+    #[inline(always)]
+    fn has_moved(&self, carrier: &Carrier<R>, [xs, ys]: Cells, (least, greatest): ([R; 3], [R; 3])) -> bool {
+        let apart = R::from_i32(self.params.apart as i32);
+        for y in ys.0..=ys.1 {
+            for x in xs.0..=xs.1 {
+                for &item in self.items(x, y) {
+                    let slab = item as usize;
+                    if item < self.params.slabs
+                        && has_moved(&self.boxes[BOX * slab..][..BOX], least, greatest, apart)
+                        && self.image_of(carrier, slab).is_some()
+                    {
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// Adds the near faces of a slab to the list of a carrier.
+    #[inline(always)]
+    fn add(&self, carrier: &Carrier<R>, slab: usize, list: &mut List<R, PERIODIC>) {
+        let Some(image) = self.image_of(carrier, slab) else { return };
+        let (first, count) = (self.slabs[SLAB * slab] as usize, self.slabs[SLAB * slab + 1] as usize);
+        let origin = of_coded(self.surface.faces[FACE * first]).0;
+        let offset = self.surface.from_node(origin, image, carrier.base).1;
+        let boxes = &self.face_boxes[FACE_BOXES * slab..][..FACE_BOXES];
+        let are_near = carrier.place.are_near(boxes, offset, carrier.reach);
+        let body = self.surface.body(first, image);
+        for face in 0..count {
+            // a slab with a known face was in an earlier cell, too
+            if are_near[face] && !list.add(body, entry(first + face, image)) {
+                break;
+            }
+        }
+    }
+}
+
 /// Makes the lists of carriers with `N` nodes.
 #[inline(always)]
 fn run<K: Kernel, R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, items: Range<usize>) {
     let params: Params = io.params();
-    let surface = Surface::<_, PERIODIC> {
-        faces: io.uints(slot!(&SLOTS, "faces")),
-        reference: Lattice::new(io, slot!(&SLOTS, "reference")),
-        displacement: Displacements::new(io, slot!(&SLOTS, "quanta"), slot!(&SLOTS, "remainder")),
-        gradient: &io.row.gradient,
-        period: params.period,
-    };
     let inverse = inverse::<_, PERIODIC>(&io.row.gradient);
-    let stretch = stretch(&inverse);
-    let (carriers, slabs) = (io.uints(slot!(&SLOTS, "carriers")), io.uints(slot!(&SLOTS, "slabs")));
+    let mut period = [R::from_f64(0.0); 2];
+    if PERIODIC {
+        for k in 0..2 {
+            period[k] = R::from_i32(params.period[k]) * R::from_f64(QUANTUM);
+        }
+    }
+    let search = Search {
+        surface: Surface::<_, PERIODIC> {
+            faces: io.uints(slot!(&SLOTS, "faces")),
+            reference: Lattice::new(io, slot!(&SLOTS, "reference")),
+            displacement: Displacements::new(io, slot!(&SLOTS, "quanta"), slot!(&SLOTS, "remainder")),
+            gradient: &io.row.gradient,
+            period: params.period,
+        },
+        params,
+        slabs: io.uints(slot!(&SLOTS, "slabs")),
+        counts: io.uints(slot!(&SLOTS, "counts")),
+        lists: io.uints(slot!(&SLOTS, "lists")),
+        boxes: io.scalars(slot!(&SLOTS, "boxes")),
+        face_boxes: io.scalars(slot!(&SLOTS, "face_boxes")),
+        stretch: stretch(&inverse),
+        period,
+    };
+    let carriers = io.uints(slot!(&SLOTS, "carriers"));
     let (nodes, points) = (io.uints(slot!(&SLOTS, "nodes")), io.scalars(slot!(&SLOTS, "points")));
-    let (counts, lists) = (io.uints(slot!(&SLOTS, "counts")), io.uints(slot!(&SLOTS, "lists")));
-    let (boxes, face_boxes) = (io.scalars(slot!(&SLOTS, "boxes")), io.scalars(slot!(&SLOTS, "face_boxes")));
+    let motion = Motion::new::<K>(io);
     let mut near = io.own::<u32>(slot!(&SLOTS, "near"));
     let mut when = io.own::<u32>(slot!(&SLOTS, "found_when"));
     let flags = io.atomic_uints(slot!(&SLOTS, "status"));
-    let period = params.period.map(|p| if PERIODIC { R::from_i32(p) * R::from_f64(QUANTUM) } else { R::from_f64(0.0) });
-    let apart = R::from_i32(params.apart as i32);
     for item in items {
-        let carrier = &carriers[CARRIER * item..][..CARRIER];
-        let (first, count, own) = (carrier[0] as usize, carrier[1] as usize, carrier[2]);
-        let coded: [u32; N] = std::array::from_fn(|a| nodes[CARRIED * first + a]);
+        let row = &carriers[CARRIER * item..][..CARRIER];
+        let (first, count, own) = (row[0] as usize, row[1] as usize, row[2]);
+        let mut coded = [0; N];
+        coded.copy_from_slice(&nodes[CARRIED * first..][..N]);
         let base = of_coded(coded[0]).0;
-        let reach = points[POINT * first + 5] + R::from_f64(f64::from(params.skin));
-        let offsets = (first..first + count).map(|point| {
-            let weights: [R; N] = std::array::from_fn(|a| points[POINT * point + a]);
-            surface.point(coded, weights).1
-        });
-        let place = Place::new(offsets, absolute::<K, _>(io, &inverse, base), &inverse);
+        let points = &points[POINT * first..][..POINT * count];
+        let reach = points[5] + R::from_f64(f64::from(params.skin));
+        let place = Place::new(&search.surface, coded, points, absolute::<K, _>(io, &inverse, base), &inverse);
         if !(place.middle[0].is_finite() && place.middle[1].is_finite() && place.heights[0].is_finite()) {
             flags[status::FLAGS].fetch_or(status::NOT_FINITE, Ordering::Relaxed);
             continue;
         }
-        let range = |k: usize| {
-            cells::<_, PERIODIC>(&params, k, place.middle[k] - place.half[k], place.middle[k] + place.half[k])
-        };
-        let ((x0, x1), (y0, y1)) = (range(0), range(1));
-        let cells = (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| cell_index(&params, x, y)));
+        let carrier = Carrier { place, base, reach, own };
+        let cells = search.cells(&carrier.place);
         // an overflow triggers a new search with larger tables
-        if cells.clone().any(|cell| counts[cell] > params.capacity) {
+        if search.overflows(cells) {
             continue;
         }
-        // slabs in the cells of the carrier; one may come several times
-        let around = cells.flat_map(|cell| &lists[cell * params.capacity as usize..][..counts[cell] as usize]);
-        let around = around.filter(|near| **near < params.slabs).map(|near| *near as usize);
-        // the image of a slab of another body within reach
-        let image_of = |slab: usize| {
-            let image = place.image_within(&boxes[BOX * slab..][..BOX], reach, stretch, period);
-            image.filter(|_| surface.marks(slabs[SLAB * slab] as usize) >> 10 != own)
-        };
         let when = when.at(0, item);
-        if *when == found::WITH_ALL {
-            let (least, greatest) = moved::<K, _, N>(io, coded);
-            let moving = |slab: &usize| has_moved(&boxes[BOX * *slab..][..BOX], least, greatest, apart);
-            if !around.clone().filter(moving).any(|slab| image_of(slab).is_some()) {
-                continue;
-            }
+        if *when == found::WITH_ALL && !search.has_moved(&carrier, cells, moved(&motion, &coded)) {
+            continue;
         }
         let (made, entries) = near.item(0, item).split_at_mut(MADE);
-        let mut list = List { entries, count: 0, full: false, surface: &surface };
-        for slab in around {
-            let Some(image) = image_of(slab) else { continue };
-            let (first, count) = (slabs[SLAB * slab] as usize, slabs[SLAB * slab + 1] as usize);
-            let origin = of_coded(surface.faces[FACE * first]).0;
-            let offset = surface.from_node(origin, image, base).1;
-            let are_near = place.are_near(&face_boxes[FACE_BOXES * slab..][..FACE_BOXES], offset, reach);
-            let body = surface.body(first, image);
-            for face in 0..count {
-                // a slab with a known face was in an earlier cell, too
-                if are_near[face] && !list.add(body, entry(first + face, image)) {
-                    break;
+        let mut list = List { entries, count: 0, full: false, surface: &search.surface };
+        let [xs, ys] = cells;
+        for y in ys.0..=ys.1 {
+            for x in xs.0..=xs.1 {
+                // a slab may be in several cells
+                for &near in search.items(x, y) {
+                    if near < params.slabs {
+                        search.add(&carrier, near as usize, &mut list);
+                    }
                 }
             }
         }

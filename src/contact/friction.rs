@@ -14,13 +14,18 @@ pub struct Slide<R> {
     pub dissipated: R,
 }
 
+/// The part of a vector across a unit normal.
+#[inline(always)]
+fn flat<R: Real>(a: Vector<R>, normal: Vector<R>) -> Vector<R> {
+    fma(normal, -dot(normal, a), a)
+}
+
 /// Advances the tangential displacement `elastic` by `motion` (relative motion over the step, mm) on a surface with unit normal
 /// `normal`, tangential stiffness `stiffness` (N/mm) and largest force `limit` (N).
 #[inline(always)]
 pub fn slide<R: Real>(elastic: Vector<R>, motion: Vector<R>, normal: Vector<R>, stiffness: R, limit: R) -> Slide<R> {
-    let flat = |a: Vector<R>| fma(normal, -dot(normal, a), a);
-    let turned = flat(elastic);
-    let trial = add(turned, flat(motion));
+    let turned = flat(elastic, normal);
+    let trial = add(turned, flat(motion, normal));
     let size = dot(trial, trial).sqrt();
     let held = size * stiffness;
     let half = R::from_f64(0.5) * stiffness;

@@ -96,7 +96,8 @@ pub fn inverse<R: Real, const PERIODIC: bool>(gradient: &[[R; 3]; 3]) -> [[R; 2]
 /// Factor by which a distance in space can grow in the pulled-back plane, along its axes.
 #[inline(always)]
 pub fn stretch<R: Real>(inverse: &[[R; 2]; 2]) -> [R; 2] {
-    [0, 1].map(|k| (inverse[k][0] * inverse[k][0] + inverse[k][1] * inverse[k][1]).sqrt())
+    let [first, second] = inverse;
+    [(first[0] * first[0] + first[1] * first[1]).sqrt(), (second[0] * second[0] + second[1] * second[1]).sqrt()]
 }
 
 /// A vector in the pulled-back plane.
@@ -111,28 +112,34 @@ pub fn absolute<K: Kernel, R: Real>(io: &Io<R>, inverse: &[[R; 2]; 2], node: usi
     let reference = io.ints(slot!(K::SLOTS, "reference"));
     let (quanta, remainder) = (io.ints(slot!(K::SLOTS, "quanta")), io.scalars(slot!(K::SLOTS, "remainder")));
     let plane = remainder.len() / 3;
-    let mm = |q: i32| R::from_i32(q) * R::from_f64(QUANTUM);
-    let along = |k: usize| mm(quanta[node + k * plane]) + remainder[node + k * plane];
-    let w = [along(0), along(1), along(2)];
+    let quantum = R::from_f64(QUANTUM);
+    let (mut x, mut w) = ([quantum; 3], [quantum; 3]);
+    for k in 0..3 {
+        let i = node + k * plane;
+        (x[k], w[k]) = (R::from_i32(reference[i]) * quantum, R::from_i32(quanta[i]) * quantum + remainder[i]);
+    }
     let back = pull_back(inverse, w);
-    ([mm(reference[node]) + back[0], mm(reference[node + plane]) + back[1]], mm(reference[node + 2 * plane]) + w[2])
+    ([x[0] + back[0], x[1] + back[1]], x[2] + w[2])
 }
 
 /// First and last cell along one axis for an interval of the pulled-back plane; the last may exceed the first by whole periods.
 #[inline(always)]
 pub fn cells<R: Real, const PERIODIC: bool>(params: &Params, axis: usize, low: R, high: R) -> (i32, i32) {
-    let real = |x: f32| R::from_f64(f64::from(x));
-    let cell = |x: R| {
-        let x = ((x - real(params.origin[axis])) / real(params.cell[axis])).max(real(-1e6)).min(real(1e6));
-        let near = x.to_i32();
-        near - i32::from(x < R::from_i32(near))
-    };
-    let (low, high, count) = (cell(low), cell(high), params.cells[axis] as i32);
+    let (low, high, count) = (cell(params, axis, low), cell(params, axis, high), params.cells[axis] as i32);
     if PERIODIC && params.period[axis] != 0 {
         (low, high.min(low + count - 1))
     } else {
         (low.clamp(0, count - 1), high.clamp(0, count - 1))
     }
+}
+
+/// Cell of a coordinate along one axis, also beyond the grid.
+#[inline(always)]
+fn cell<R: Real>(params: &Params, axis: usize, x: R) -> i32 {
+    let (origin, size) = (R::from_f64(f64::from(params.origin[axis])), R::from_f64(f64::from(params.cell[axis])));
+    let x = ((x - origin) / size).max(R::from_f64(-1e6)).min(R::from_f64(1e6));
+    let near = x.to_i32();
+    near - i32::from(x < R::from_i32(near))
 }
 
 /// Index of a cell.
@@ -142,18 +149,33 @@ pub fn cell_index(params: &Params, x: i32, y: i32) -> usize {
     (y.rem_euclid(ny) * nx + x.rem_euclid(nx)) as usize
 }
 
-/// Displacement of a node since the last full search, quanta: the kernel binds the displacement at that search as `before`.
-#[inline(always)]
-pub fn motion<K: Kernel, R: Real>(io: &Io<R>, node: usize) -> [i32; 3] {
-    let (quanta, remainder) = (io.ints(slot!(K::SLOTS, "quanta")), io.scalars(slot!(K::SLOTS, "remainder")));
-    let before = io.ints(slot!(K::SLOTS, "before"));
-    let plane = before.len() / 3;
-    let along = |k: usize| {
-        let i = node + k * plane;
-        let now = quanta[i].wrapping_add((remainder[i] * R::from_f64(1.0 / QUANTUM)).to_i32());
-        now.wrapping_sub(before[i]).clamp(-MOST_MOTION, MOST_MOTION)
-    };
-    [along(0), along(1), along(2)]
+/// Displacements of nodes, and those at the last full search.
+pub struct Motion<'a, R> {
+    now: Displacements<'a, R>,
+    before: Lattice<'a>,
+}
+
+impl<'a, R: Real> Motion<'a, R> {
+    /// From the bindings of a kernel, which binds the displacements at the last full search as `before`.
+    #[inline(always)]
+    pub fn new<K: Kernel>(io: &'a Io<R>) -> Self {
+        Self {
+            now: Displacements::new(io, slot!(K::SLOTS, "quanta"), slot!(K::SLOTS, "remainder")),
+            before: Lattice::new(io, slot!(K::SLOTS, "before")),
+        }
+    }
+
+    /// Displacement of a node since the last full search, quanta.
+    #[inline(always)]
+    fn of(&self, node: usize) -> [i32; 3] {
+        let ((quanta, remainder), before) = (self.now.at(node), self.before.at(node));
+        let mut motion = [0; 3];
+        for k in 0..3 {
+            let now = quanta[k].wrapping_add((remainder[k] * R::from_f64(1.0 / QUANTUM)).to_i32());
+            motion[k] = now.wrapping_sub(before[k]).clamp(-MOST_MOTION, MOST_MOTION);
+        }
+        motion
+    }
 }
 
 /// Whether an item, by its box, has moved by more than `apart` relative to an item with motion between `low` and `high`, or
@@ -161,13 +183,14 @@ pub fn motion<K: Kernel, R: Real>(io: &Io<R>, node: usize) -> [i32; 3] {
 #[inline(always)]
 pub fn has_moved<R: Real>(bounds: &[R], low: [R; 3], high: [R; 3], apart: R) -> bool {
     let most = R::from_i32(MOST_MOTION);
-    let beyond = |k: usize| {
+    let mut moved = false;
+    for k in 0..3 {
         let (least, greatest) = (bounds[MOTION + k].min(low[k]), bounds[MOTION + 3 + k].max(high[k]));
-        (bounds[MOTION + 3 + k] - low[k]).max(high[k] - bounds[MOTION + k]) > apart
+        moved |= (bounds[MOTION + 3 + k] - low[k]).max(high[k] - bounds[MOTION + k]) > apart
             || least <= -most
-            || greatest >= most
-    };
-    beyond(0) || beyond(1) || beyond(2)
+            || greatest >= most;
+    }
+    moved
 }
 
 /// Bounds of the motion of some nodes, quanta.
@@ -185,17 +208,22 @@ impl Moved {
 
     /// Includes a node.
     #[inline(always)]
-    pub fn add(&mut self, motion: [i32; 3]) {
-        for (k, along) in motion.into_iter().enumerate() {
-            self.least[k] = self.least[k].min(along);
-            self.greatest[k] = self.greatest[k].max(along);
+    pub fn add<R: Real>(&mut self, motion: &Motion<R>, node: usize) {
+        let motion = motion.of(node);
+        for k in 0..3 {
+            self.least[k] = self.least[k].min(motion[k]);
+            self.greatest[k] = self.greatest[k].max(motion[k]);
         }
     }
 
     /// The bounds as numbers of a box.
     #[inline(always)]
     pub fn bounds<R: Real>(&self) -> ([R; 3], [R; 3]) {
-        ([0, 1, 2].map(|k| R::from_i32(self.least[k])), [0, 1, 2].map(|k| R::from_i32(self.greatest[k])))
+        let (mut least, mut greatest) = ([R::from_f64(0.0); 3], [R::from_f64(0.0); 3]);
+        for k in 0..3 {
+            (least[k], greatest[k]) = (R::from_i32(self.least[k]), R::from_i32(self.greatest[k]));
+        }
+        (least, greatest)
     }
 }
 
@@ -218,9 +246,10 @@ impl<R: Real> Bounds<R> {
     #[inline(always)]
     fn grow(&mut self, inverse: &[[R; 2]; 2], v: [R; 3]) {
         let back = pull_back(inverse, v);
-        for (k, x) in [back[0], back[1], v[2]].into_iter().enumerate() {
-            self.low[k] = self.low[k].min(x);
-            self.high[k] = self.high[k].max(x);
+        let v = [back[0], back[1], v[2]];
+        for k in 0..3 {
+            self.low[k] = self.low[k].min(v[k]);
+            self.high[k] = self.high[k].max(v[k]);
         }
     }
 }
@@ -278,13 +307,14 @@ impl<'a, R: Real> Grid<'a, R> {
             greatest[1],
             greatest[2],
         ]);
-        let range = |k: usize| {
+        let mut ranges = [(0, 0); 2];
+        for k in 0..2 {
             let room = reach * stretch[k] + R::from_f64(ROUNDING);
-            cells::<R, PERIODIC>(params, k, base[k] + low[k] - room, base[k] + high[k] + room)
-        };
-        let ((x0, x1), (y0, y1)) = (range(0), range(1));
-        for y in y0..=y1 {
-            for x in x0..=x1 {
+            ranges[k] = cells::<R, PERIODIC>(params, k, base[k] + low[k] - room, base[k] + high[k] + room);
+        }
+        let [xs, ys] = ranges;
+        for y in ys.0..=ys.1 {
+            for x in xs.0..=xs.1 {
                 let cell = cell_index(params, x, y);
                 let place = counts[cell].fetch_add(1, Ordering::Relaxed);
                 if place < params.capacity {
@@ -327,6 +357,7 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
             gradient: &io.row.gradient,
             period: grid.params.period,
         };
+        let motion = Motion::new::<Self>(io);
         let slabs = io.uints(slot!(Self::SLOTS, "slabs"));
         let mut face_boxes = io.own::<L::Scalar>(slot!(Self::SLOTS, "face_boxes"));
         let reach = L::Scalar::from_f64(f64::from(grid.params.thread_radius + grid.params.skin));
@@ -340,10 +371,11 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
                 let corners = surface.corners(first + place, [0, 0], origin, (zero, zero));
                 for a in 0..4 {
                     bounds.grow(&inverse, corners.current[a]);
-                    bounds.moved.add(motion::<Self, _>(io, corners.nodes[a]));
+                    bounds.moved.add(&motion, corners.nodes[a]);
                 }
                 for k in 0..3 {
-                    let [a, b, c, d] = [0, 1, 2, 3].map(|corner| corners.current[corner][k]);
+                    let [a, b, c, d] = &corners.current;
+                    let (a, b, c, d) = (a[k], b[k], c[k], d[k]);
                     face_boxes[SLAB_FACES * k + place] = a.min(b).min(c.min(d));
                     face_boxes[SLAB_FACES * (3 + k) + place] = a.max(b).max(c.max(d));
                 }
@@ -383,16 +415,17 @@ impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
             neighbours: io.uints(slot!(Self::SLOTS, "neighbours")),
             shares: io.scalars(slot!(Self::SLOTS, "shares")),
         };
+        let motion = Motion::new::<Self>(io);
         let reach = L::Scalar::from_f64(f64::from(2.0 * grid.params.thread_radius + grid.params.skin));
         for item in items {
             let beam = item - grid.params.slabs as usize;
             let piece = offsets.piece::<PERIODIC>(beams, ends, beam, &displacement, &io.row.gradient);
             let mut bounds = Bounds::new();
-            piece.now.into_iter().for_each(|end| bounds.grow(&inverse, end));
+            bounds.grow(&inverse, piece.now[0]);
+            bounds.grow(&inverse, piece.now[1]);
             let (first, last) = (ends[2 * beam] as usize, ends[2 * beam + 1] as usize);
-            for node in [first, last] {
-                bounds.moved.add(motion::<Self, _>(io, node));
-            }
+            bounds.moved.add(&motion, first);
+            bounds.moved.add(&motion, last);
             grid.put::<Self, PERIODIC>(io, item, first, bounds, reach);
         }
     }

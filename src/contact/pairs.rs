@@ -96,20 +96,21 @@ impl<'a, R: Real, const PERIODIC: bool> Scene<'a, R, PERIODIC> {
         let rest: Vector<R> = self.reference.between(b, a, shift::<PERIODIC>(self.period, image));
         let affine = if PERIODIC { add(rest, apply(self.gradient, rest)) } else { rest };
         let now = add(affine, self.displacement.between(b, a));
-        let between = |own: [Vector<R>; 2], apart, other: [Vector<R>; 2]| Segments {
-            along: sub(own[1], own[0]),
-            start: add(apart, sub(other[0], own[0])),
-            other: sub(other[1], other[0]),
-        };
         [between(own.rest, rest, other.rest), between(own.now, now, other.now)]
     }
 
     /// Whether beam `a` subtracts the joint at the first end of `b`: it does if it also forms a pair with the beam before `b`.
     #[inline(always)]
     pub fn owns(&self, a: usize, b: usize, image: [i32; 2]) -> bool {
-        let before = self.offsets.before(b, image);
-        before.is_some_and(|(before, image)| before > a && !self.offsets.are_near(a, before, image, self.self_arc))
+        let Some((before, image)) = self.offsets.before(b, image) else { return false };
+        before > a && !self.offsets.are_near(a, before, image, self.self_arc)
     }
+}
+
+/// The pieces `own` and `other`, with the vector from the first node of one beam to that of the other.
+#[inline(always)]
+fn between<R: Real>(own: [Vector<R>; 2], apart: Vector<R>, other: [Vector<R>; 2]) -> Segments<R> {
+    Segments { along: sub(own[1], own[0]), start: add(apart, sub(other[0], own[0])), other: sub(other[1], other[0]) }
 }
 
 /// The search data for the neighbours of a beam.
@@ -131,21 +132,27 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
     #[inline(always)]
     fn cells(&self, io: &Io<R>, beam: usize, piece: &Piece<R>) -> Option<Cells> {
         let (node, _) = absolute::<Pairs<PERIODIC>, _>(io, &self.inverse, self.scene.ends[2 * beam] as usize);
-        let ends = piece.now.map(|end| pull_back(&self.inverse, end));
-        let range = |k: usize| {
-            let (a, b) = (node[k] + ends[0][k], node[k] + ends[1][k]);
-            cells::<_, PERIODIC>(&self.params, k, a.min(b), a.max(b))
-        };
-        (node[0].is_finite() && node[1].is_finite()).then(|| [range(0), range(1)])
+        if !(node[0].is_finite() && node[1].is_finite()) {
+            return None;
+        }
+        let (first, second) = (pull_back(&self.inverse, piece.now[0]), pull_back(&self.inverse, piece.now[1]));
+        let mut ranges = [(0, 0); 2];
+        for k in 0..2 {
+            let (a, b) = (node[k] + first[k], node[k] + second[k]);
+            ranges[k] = cells::<_, PERIODIC>(&self.params, k, a.min(b), a.max(b));
+        }
+        Some(ranges)
     }
 
     /// The items of a cell; if it is full, the count exceeds its capacity.
     #[inline(always)]
     fn items(&self, x: i32, y: i32) -> Option<&[u32]> {
         let cell = cell_index(&self.params, x, y);
-        let capacity = self.params.capacity as usize;
-        (self.counts[cell] <= self.params.capacity)
-            .then(|| &self.lists[cell * capacity..][..self.counts[cell] as usize])
+        let (count, capacity) = (self.counts[cell], self.params.capacity);
+        if count > capacity {
+            return None;
+        }
+        Some(&self.lists[cell * capacity as usize..][..count as usize])
     }
 
     /// Whether a beam of a higher number in these cells has moved relative to this one since the last full search; `None` if a
@@ -154,16 +161,19 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
     fn has_moved(&self, beam: usize, [xs, ys]: Cells) -> Option<bool> {
         let item = self.params.slabs + beam as u32;
         let own = &self.boxes[BOX * item as usize..][..BOX];
-        let (least, greatest) = ([0, 1, 2].map(|k| own[MOTION + k]), [0, 1, 2].map(|k| own[MOTION + 3 + k]));
+        let least = [own[MOTION], own[MOTION + 1], own[MOTION + 2]];
+        let greatest = [own[MOTION + 3], own[MOTION + 4], own[MOTION + 5]];
         let apart = R::from_i32(self.params.apart as i32);
         let mut moved = false;
         for y in ys.0..=ys.1 {
             for x in xs.0..=xs.1 {
-                let near = self.items(x, y)?.iter().filter(|near| **near > item);
-                moved = moved
-                    || near
-                        .into_iter()
-                        .any(|near| has_moved(&self.boxes[BOX * *near as usize..][..BOX], least, greatest, apart));
+                for &near in self.items(x, y)? {
+                    if moved {
+                        break;
+                    }
+                    let bounds = &self.boxes[BOX * near as usize..][..BOX];
+                    moved = near > item && has_moved(bounds, least, greatest, apart);
+                }
             }
         }
         Some(moved)
@@ -173,13 +183,14 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
     #[inline(always)]
     fn image(&self, beam: usize, near: usize) -> [i32; 2] {
         let item = self.params.slabs as usize + beam;
-        [0, 1].map(|k| {
-            if !PERIODIC || self.params.period[k] == 0 {
-                return 0;
+        let mut image = [0; 2];
+        for k in 0..2 {
+            if PERIODIC && self.params.period[k] != 0 {
+                let apart = self.boxes[BOX * item + k] - self.boxes[BOX * near + k];
+                image[k] = (apart / (R::from_i32(self.params.period[k]) * R::from_f64(QUANTUM))).to_i32();
             }
-            let apart = self.boxes[BOX * item + k] - self.boxes[BOX * near + k];
-            (apart / (R::from_i32(self.params.period[k]) * R::from_f64(QUANTUM))).to_i32()
-        })
+        }
+        image
     }
 
     /// Whether a pair is within reach.
@@ -231,7 +242,10 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
                     let other = (near - self.params.slabs) as usize;
                     let image = self.image(beam, near as usize);
                     let key = key(other, image);
-                    let place = keys[..count].iter().take_while(|known| **known < key).count();
+                    let mut place = 0;
+                    while place < count && keys[place] < key {
+                        place += 1;
+                    }
                     let is_known = place < count && keys[place] == key;
                     if is_known
                         || self.scene.offsets.are_near(beam, other, image, self.scene.self_arc)

@@ -41,6 +41,13 @@ struct Part<R> {
     slope: R,
 }
 
+impl<R: Real> Part<R> {
+    #[inline(always)]
+    fn new(low: R, high: R, base: R, slope: R) -> Self {
+        Self { low, high, base, slope }
+    }
+}
+
 /// Contact forces between two segments.
 pub struct Push<R> {
     /// Energy, mJ, and its derivative by the distance R, N.
@@ -79,16 +86,17 @@ impl<R: Real> Segments<R> {
         let forward = !(turn < zero);
         let least = size * R::from_f64(STRAIGHT);
         let safe = if forward { turn.max(least) } else { turn.min(-least) };
-        let unit = |s: R| s.max(zero).min(one);
         let (enters, leaves) = (unit(first / safe), unit((first + size) / safe));
         let (low, high) = if forward { (enters, leaves) } else { (leaves, enters) };
-        let part = |low, high, base, slope| Part { low, high, base, slope };
-        let inside = part(low, high, -first / size, turn / size);
-        if forward {
-            [part(zero, low, zero, zero), inside, part(high, one, one, zero), part(low, one, zero, zero)]
-        } else {
-            [part(high, one, zero, zero), inside, part(zero, low, one, zero), part(zero, high, zero, zero)]
-        }
+        let inside = Part::new(low, high, -first / size, turn / size);
+        let (ends, beyond) =
+            if forward { ([zero, low, high, one], [low, one]) } else { ([high, one, zero, low], [zero, high]) };
+        [
+            Part::new(ends[0], ends[1], zero, zero),
+            inside,
+            Part::new(ends[2], ends[3], one, zero),
+            Part::new(beyond[0], beyond[1], zero, zero),
+        ]
     }
 
     /// Vector from the projection on B to a point s of A: its value at s = 0, and its change with s, mm.
@@ -101,10 +109,10 @@ impl<R: Real> Segments<R> {
     /// Distance of the two segments, mm.
     #[inline(always)]
     pub fn distance(&self) -> R {
-        let [first, inside, second, _] = self.parts();
+        let parts = self.parts();
         let mut least = dot(self.start, self.start);
-        for part in [first, inside, second] {
-            let (base, slope) = self.between(&part);
+        for part in &parts[..3] {
+            let (base, slope) = self.between(part);
             let curvature = dot(slope, slope).max(dot(self.along, self.along) * R::from_f64(STRAIGHT));
             let s = (-dot(base, slope) / curvature).max(part.low).min(part.high);
             let offset = fma(slope, s, base);
@@ -119,28 +127,20 @@ impl<R: Real> Segments<R> {
     /// reference length of A; `owns` tells whether B owns the joint at its first end.
     #[inline(always)]
     pub fn push(&self, reach: R, strength: R, owns: bool) -> Push<R> {
-        let (zero, one) = (R::from_f64(0.0), R::from_f64(1.0));
         let [first, inside, second, beyond] = self.parts();
-        let mut push = Push {
-            energy: zero,
-            growth: zero,
-            own: [[zero; 3]; 2],
-            others: [[zero; 3]; 2],
-            own_rows: [zero; 2],
-            other_rows: [zero; 2],
-            stiffness: zero,
-            at: [zero; 2],
-            weight: zero,
-        };
-        push.add(self, &inside, reach, strength, one);
-        push.add(self, &second, reach, strength, one);
-        if owns {
-            push.add(self, &beyond, reach, strength, -one);
-        } else {
-            push.add(self, &first, reach, strength, one);
-        }
+        let mut push = Push::none();
+        push.add(self, &inside, reach, strength);
+        push.add(self, &second, reach, strength);
+        let (last, strength) = if owns { (beyond, -strength) } else { (first, strength) };
+        push.add(self, &last, reach, strength);
         push
     }
+}
+
+/// The nearest number from 0 to 1.
+#[inline(always)]
+fn unit<R: Real>(s: R) -> R {
+    s.max(R::from_f64(0.0)).min(R::from_f64(1.0))
 }
 
 /// Interval of a part in which q = |base + slope s|² is below `square`; an empty interval if there is none.
@@ -159,9 +159,26 @@ fn touching<R: Real>(part: &Part<R>, base: Vector<R>, slope: Vector<R>, square: 
 }
 
 impl<R: Real> Push<R> {
-    /// Adds a part, or subtracts it with a `sign` of −1.
+    /// No contact.
     #[inline(always)]
-    fn add(&mut self, segments: &Segments<R>, part: &Part<R>, reach: R, strength: R, sign: R) {
+    pub fn none() -> Self {
+        let zero = R::from_f64(0.0);
+        Self {
+            energy: zero,
+            growth: zero,
+            own: [[zero; 3]; 2],
+            others: [[zero; 3]; 2],
+            own_rows: [zero; 2],
+            other_rows: [zero; 2],
+            stiffness: zero,
+            at: [zero; 2],
+            weight: zero,
+        }
+    }
+
+    /// Adds a part, or subtracts it with a negative strength.
+    #[inline(always)]
+    fn add(&mut self, segments: &Segments<R>, part: &Part<R>, reach: R, strength: R) {
         let (zero, one) = (R::from_f64(0.0), R::from_f64(1.0));
         let square = reach * reach;
         let (base, slope) = segments.between(part);
@@ -170,12 +187,12 @@ impl<R: Real> Push<R> {
             return;
         }
         let half = R::from_f64(0.5) / square;
-        for [place, weight] in GAUSS {
+        for &[place, weight] in &GAUSS {
             let s = low + (high - low) * R::from_f64(place);
             let t = part.base + part.slope * s;
             let offset = fma(slope, s, base);
             let inside = (square - dot(offset, offset)).max(zero);
-            let share = sign * strength * (high - low) * R::from_f64(weight);
+            let share = strength * (high - low) * R::from_f64(weight);
             let pressed = share * half * inside;
             self.energy = self.energy + R::from_f64(0.25) * pressed * inside;
             self.growth = self.growth + half * reach * pressed * (square + square - inside);

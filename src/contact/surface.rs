@@ -78,8 +78,13 @@ impl<R: Real, const PERIODIC: bool> Surface<'_, R, PERIODIC> {
     #[inline(always)]
     pub fn body(&self, face: usize, image: [i32; 2]) -> u32 {
         let marks = self.marks(face);
-        let lateral = |axis: usize| if marks >> (8 + axis) & 1 == 1 { 0 } else { image[axis] };
-        key((marks >> 10) as usize, [lateral(0), lateral(1)])
+        let mut lateral = image;
+        for axis in 0..2 {
+            if marks >> (8 + axis) & 1 == 1 {
+                lateral[axis] = 0;
+            }
+        }
+        key((marks >> 10) as usize, lateral)
     }
 
     /// Reference and current position of a node in an image relative to another node.

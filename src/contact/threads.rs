@@ -9,7 +9,7 @@ use super::friction::slide;
 use super::pairs::{READS, Scene};
 use super::segments::{self, Push, Segments};
 use super::sums::{self, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
-use super::{EMPTY, Params, add_force, add_stiffness, is_in_range, of_key, slot_state, status};
+use super::{EMPTY, Params, add_force, is_in_range, of_key, slot_state, status};
 use crate::elements::beam2::{self, TABLE};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Slot, constants, joined, slot};
@@ -46,9 +46,8 @@ const FORCE: [Slot; 15] = joined(
 /// Contact forces of pairs of beams.
 pub struct Force<const FRICTION: bool, const PERIODIC: bool>;
 
-/// Two touching beams: their nodes and weights, the penalty times their lengths, N/mm, and their reference pieces.
+/// Two touching beams: weights of their nodes, the penalty times their lengths, N/mm, and their reference pieces.
 struct Pair<R> {
-    nodes: [[usize; 4]; 2],
     weights: [[[R; 4]; 2]; 2],
     strengths: [R; 2],
     rest: Segments<R>,
@@ -59,44 +58,78 @@ impl<R: Real> Pair<R> {
     #[inline(always)]
     fn at(&self, points: [R; 2]) -> [[R; 4]; 2] {
         let one = R::from_f64(1.0);
-        [0, 1].map(|i| {
-            let ([first, second], s) = (self.weights[i], points[i]);
-            [0, 1, 2, 3].map(|n| first[n] * (one - s) + second[n] * s)
-        })
+        let mut weights = [self.weights[0][0], self.weights[1][0]];
+        for i in 0..2 {
+            let ([first, second], s) = (&self.weights[i], points[i]);
+            for n in 0..4 {
+                weights[i][n] = first[n] * (one - s) + second[n] * s;
+            }
+        }
+        weights
     }
 
-    /// Adds forces on the ends of both pieces to their nodes, as integers whose sum is zero.
+    /// Adds forces on the ends of both pieces to their nodes, as integers whose sum is zero; `inverse` is one over the quantum.
     #[inline(always)]
-    fn add_forces(&self, forces: &[AtomicI32], status: &[AtomicU32], quantum: R, push: &Push<R>) {
+    fn add_forces(&self, loads: &mut [Load; 2], status: &[AtomicU32], inverse: R, push: &Push<R>) {
         let mut rest = [0i32; 3];
-        for (i, ends) in [push.own, push.others].into_iter().enumerate() {
-            for (n, node) in self.nodes[i].into_iter().enumerate() {
+        for i in 0..2 {
+            let ends = if i == 0 { push.own } else { push.others };
+            for n in 0..4 {
                 let force = fma(ends[0], self.weights[i][0][n], scale(ends[1], self.weights[i][1][n]));
-                let quanta = scale(force, R::from_f64(1.0) / quantum);
-                if !quanta.into_iter().all(|quanta| is_in_range(status, quanta, node)) {
-                    return;
+                let quanta = scale(force, inverse);
+                let mut whole = [0; 3];
+                for k in 0..3 {
+                    if !is_in_range(status, quanta[k], loads[i].nodes[n]) {
+                        return;
+                    }
+                    whole[k] = quanta[k].to_i32();
                 }
-                let whole = if (i, n) == (1, 3) { rest } else { quanta.map(R::to_i32) };
-                rest = [0, 1, 2].map(|k| rest[k] - whole[k]);
-                add_force(forces, node, whole);
+                if (i, n) == (1, 3) {
+                    whole = rest;
+                }
+                for k in 0..3 {
+                    rest[k] -= whole[k];
+                    loads[i].forces[n][k] = loads[i].forces[n][k].wrapping_add(whole[k]);
+                }
             }
         }
     }
 
-    /// Adds bounds of the stiffness at the ends of both pieces, times the sum of the weights of both.
+    /// Adds bounds of the stiffness at the ends of both pieces, times the sum of the weights of both; `inverse` as above.
     #[inline(always)]
-    fn add_rows(&self, stiffness: &[AtomicI32], quantum: R, push: &Push<R>, most_weights: R) {
-        for (i, rows) in [push.own_rows, push.other_rows].into_iter().enumerate() {
-            for (end, row) in rows.into_iter().enumerate() {
-                add_stiffness(
-                    stiffness,
-                    row * most_weights,
-                    quantum,
-                    self.nodes[i].into_iter().zip(self.weights[i][end]),
-                );
+    fn add_rows(&self, loads: &mut [Load; 2], inverse: R, push: &Push<R>, most_weights: R) {
+        for i in 0..2 {
+            let rows = if i == 0 { push.own_rows } else { push.other_rows };
+            for end in 0..2 {
+                let quanta = rows[end] * most_weights * inverse;
+                for n in 0..4 {
+                    let whole = (quanta * self.weights[i][end][n].abs()).to_i32();
+                    loads[i].rows[n] = loads[i].rows[n].wrapping_add(whole);
+                }
             }
         }
     }
+}
+
+/// Forces and stiffness of the four nodes of a piece, quanta: summed over pairs, then added to those of the scene.
+struct Load {
+    nodes: [usize; 4],
+    forces: [[i32; 3]; 4],
+    rows: [i32; 4],
+}
+
+impl Load {
+    #[inline(always)]
+    fn new(nodes: [usize; 4]) -> Self {
+        Self { nodes, forces: [[0; 3]; 4], rows: [0; 4] }
+    }
+}
+
+/// A beam with its piece, and the loads of this piece and of the one that it touched last.
+struct Own<R> {
+    beam: usize,
+    piece: Piece<R>,
+    loads: [Load; 2],
 }
 
 /// Inputs and sums of touching pairs.
@@ -109,6 +142,9 @@ struct Touch<'a, R, const FRICTION: bool, const PERIODIC: bool> {
     stiffness: &'a [AtomicI32],
     flags: &'a [AtomicU32],
     params: Params,
+    /// One over the quanta of force and of stiffness, exact since these are powers of two.
+    per_force: R,
+    per_stiffness: R,
     /// Distance at which threads touch, mm, and its increment since the previous step.
     reach: R,
     growth: R,
@@ -135,6 +171,8 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
             stiffness: io.atomics(slot!(&FORCE, "stiffness")),
             flags: io.atomic_uints(slot!(&FORCE, "status")),
             params,
+            per_force: R::from_f64(1.0) / real(params.force_quantum),
+            per_stiffness: R::from_f64(1.0) / real(params.stiffness_quantum),
             reach: thick * io.row.radius,
             growth: thick * io.row.radius_increment,
             elapsed: io.row.dt_mid + io.row.dt_mid - io.row.dt,
@@ -144,15 +182,16 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
     /// Reduces the gap counters, and tells whether one of a beam's pairs can touch.
     #[inline(always)]
     fn can_touch(&self, beam: usize, keys: &[u32], states: &mut [R]) -> bool {
-        let zero = R::from_f64(0.0);
+        let (zero, size) = (R::from_f64(0.0), const { slot_state(FRICTION) });
         let weights = self.scene.offsets.most_weights(beam);
         let mut can_touch = false;
-        for (key, state) in keys.iter().zip(states.chunks_exact_mut(slot_state(FRICTION))) {
-            if state[0] < zero {
-                let mean = R::from_f64(0.5) * (weights + self.scene.offsets.most_weights(of_key(*key).0));
-                state[0] = state[0] + self.row.approach * mean * self.elapsed + self.growth;
+        for slot in 0..keys.len() {
+            let state = &mut states[size * slot];
+            if *state < zero {
+                let mean = R::from_f64(0.5) * (weights + self.scene.offsets.most_weights(of_key(keys[slot]).0));
+                *state = *state + self.row.approach * mean * self.elapsed + self.growth;
             }
-            can_touch |= !(state[0] < zero);
+            can_touch |= !(*state < zero);
         }
         can_touch
     }
@@ -181,34 +220,35 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
         }
     }
 
-    /// Forces between a known beam piece and another beam; whether they touch.
+    /// Forces between a beam and another one; their depth if they touch, mm, else zero.
     #[inline(always)]
-    fn pair(&self, beam: usize, own: &Piece<R>, key: u32, state: &mut [R], sum: &mut [R]) -> bool {
+    fn pair(&self, own: &mut Own<R>, key: u32, state: &mut [R], sum: &mut [R]) -> R {
         let zero = R::from_f64(0.0);
-        let (other, image) = of_key(key);
-        let [rest, now] = self.scene.segments(beam, own, other, image);
-        let strengths = [beam, other].map(|beam| real::<R>(self.params.thread_thread) * self.length(beam));
+        let (beam, (other, image)) = (own.beam, of_key(key));
+        let [rest, now] = self.scene.segments(beam, &own.piece, other, image);
+        let penalty = real::<R>(self.params.thread_thread);
+        let strengths = [penalty * self.length(beam), penalty * self.length(other)];
         let depth = self.reach - now.distance();
-        let push = || now.push(self.reach, strengths[0], self.scene.owns(beam, other, image));
-        let push = if depth > zero { Some(push()) } else { None };
-        let Some(mut push) = push.filter(|push| push.weight > zero) else {
+        let mut push = if depth > zero {
+            now.push(self.reach, strengths[0], self.scene.owns(beam, other, image))
+        } else {
+            Push::none()
+        };
+        if !(push.weight > zero) {
             self.release(beam, state, sum);
             state[0] = depth.min(zero);
-            return false;
-        };
+            return zero;
+        }
         sum[SUM_ENERGY] = sum[SUM_ENERGY] + push.energy;
         sum[SUM_RADIUS] = sum[SUM_RADIUS] + push.growth * self.growth;
         let offsets = &self.scene.offsets;
-        let pair = Pair {
-            nodes: [beam, other].map(|beam| offsets.nodes(self.scene.ends, beam)),
-            weights: [beam, other].map(|beam| offsets.weights(beam)),
-            strengths,
-            rest,
-        };
+        self.go_on(&mut own.loads[1], offsets.nodes(self.scene.ends, other));
+        let nodes = [own.loads[0].nodes, own.loads[1].nodes];
+        let pair = Pair { weights: [offsets.weights(beam), offsets.weights(other)], strengths, rest };
         let pressed = norm(push.total());
         if pressed > zero {
             let tangential = if FRICTION { self.tangential(beam) } else { zero };
-            self.resist(&pair, pressed, tangential, &mut push, state, sum);
+            self.resist(&pair, nodes, [pressed, tangential], &mut push, state, sum);
         } else {
             self.release(beam, state, sum);
         }
@@ -219,15 +259,46 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
             add_virial(sum, push.others[0], pair.rest.start);
             add_virial(sum, push.others[1], add(pair.rest.start, pair.rest.other));
         }
-        pair.add_forces(self.forces, self.flags, real(self.params.force_quantum), &push);
+        pair.add_forces(&mut own.loads, self.flags, self.per_force, &push);
         let most_weights = offsets.most_weights(beam) + offsets.most_weights(other);
-        pair.add_rows(self.stiffness, real(self.params.stiffness_quantum), &push, most_weights);
-        raise(&self.flags[status::PENETRATION[2]], depth);
-        true
+        pair.add_rows(&mut own.loads, self.per_stiffness, &push, most_weights);
+        depth
+    }
+
+    /// Adds the load of a node to the forces and the stiffness of the scene.
+    #[inline(always)]
+    fn give(&self, load: &Load, n: usize) {
+        if load.rows[n] != 0 || load.forces[n] != [0; 3] {
+            add_force(self.forces, load.nodes[n], load.forces[n]);
+            self.stiffness[load.nodes[n]].fetch_add(load.rows[n], Ordering::Relaxed);
+        }
+    }
+
+    /// Adds the loads of all nodes.
+    #[inline(always)]
+    fn give_all(&self, load: &Load) {
+        for n in 0..4 {
+            self.give(load, n);
+        }
+    }
+
+    /// Goes on to other nodes: the next piece of a thread shares three with the one before.
+    #[inline(always)]
+    fn go_on(&self, load: &mut Load, nodes: [usize; 4]) {
+        if load.nodes[1] == nodes[0] && load.nodes[2] == nodes[1] && load.nodes[3] == nodes[2] {
+            self.give(load, 0);
+            for n in 0..3 {
+                (load.forces[n], load.rows[n]) = (load.forces[n + 1], load.rows[n + 1]);
+            }
+            (load.nodes, load.forces[3], load.rows[3]) = (nodes, [0; 3], 0);
+        } else {
+            self.give_all(load);
+            *load = Load::new(nodes);
+        }
     }
 
     /// Adds damping, and friction of stiffness `tangential` (N/mm), to an elastic force of size `pressed` (N), at its point of
-    /// action.
+    /// action, for a pair with its nodes.
     ///
     /// Damping is a share of the critical value for the touching lengths, with their penalty and mass: it is the same per
     /// contact length in any mesh, and it cannot reverse the velocity. A node has half of its mass on either side.
@@ -238,14 +309,24 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
     /// that no contact gains energy however few steps it lasts. The dissipation is computed with the mean of
     /// both, less what the damping itself slows within half a step.
     #[inline(always)]
-    fn resist(&self, pair: &Pair<R>, pressed: R, tangential: R, push: &mut Push<R>, state: &mut [R], sum: &mut [R]) {
+    fn resist(
+        &self,
+        pair: &Pair<R>,
+        nodes: [[usize; 4]; 2],
+        [pressed, tangential]: [R; 2],
+        push: &mut Push<R>,
+        state: &mut [R],
+        sum: &mut [R],
+    ) {
         let (zero, one, half) = (R::from_f64(0.0), R::from_f64(1.0), R::from_f64(0.5));
-        let [s, t] = push.at.map(|moment| moment / push.weight);
+        let (s, t) = (push.at[0] / push.weight, push.at[1] / push.weight);
         let normal = scale(push.total(), one / pressed);
         let mut motion = [zero; 3];
         let mut square = zero;
-        for (i, weights) in pair.at([s, t]).into_iter().enumerate() {
-            for (node, weight) in pair.nodes[i].into_iter().zip(weights) {
+        let weights = pair.at([s, t]);
+        for i in 0..2 {
+            for n in 0..4 {
+                let (node, weight) = (nodes[i][n], weights[i][n]);
                 motion = fma(self.velocity.at(node), if i == 0 { weight } else { -weight }, motion);
                 square = square + (pair.strengths[i] + pair.strengths[i]) * weight * weight / self.mass[node];
             }
@@ -307,33 +388,47 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let zero = L::Scalar::from_f64(0.0);
+        let (zero, size) = (L::Scalar::from_f64(0.0), const { slot_state(FRICTION) });
         let touch = Touch::<_, FRICTION, PERIODIC>::new(io);
         let mut keys = io.own::<u32>(slot!(&FORCE, "keys"));
         let mut states = io.own::<L::Scalar>(slot!(&FORCE, "states"));
         let mut sums = io.own::<L::Scalar>(slot!(&FORCE, "sums"));
+        let (mut touching, mut deepest) = (0, zero);
         for beam in items {
-            let slot_keys = keys.item(0, beam);
-            if slot_keys[0] == EMPTY {
+            let keys = keys.item(0, beam);
+            let mut count = 0;
+            while count < keys.len() && keys[count] != EMPTY {
+                count += 1;
+            }
+            if count == 0 {
                 continue;
             }
-            let slot_states = states.item(0, beam);
+            let states = states.item(0, beam);
             let sum = sums.item(0, beam);
-            let count = slot_keys.iter().position(|key| *key == EMPTY).unwrap_or(slot_keys.len());
             sum[SUM_ENERGY] = zero;
-            if !touch.can_touch(beam, &slot_keys[..count], slot_states) {
+            if !touch.can_touch(beam, &keys[..count], states) {
                 continue;
             }
-            let own = touch.scene.piece(beam);
-            let mut touches = false;
-            for (key, state) in slot_keys[..count].iter().zip(slot_states.chunks_exact_mut(slot_state(FRICTION))) {
+            let nodes = touch.scene.offsets.nodes(touch.scene.ends, beam);
+            let loads = [Load::new(nodes), Load::new([0; 4])];
+            let mut own = Own { beam, piece: touch.scene.piece(beam), loads };
+            let mut depth = zero;
+            for slot in 0..count {
+                let state = &mut states[size * slot..][..size];
                 if !(state[0] < zero) {
-                    touches |= touch.pair(beam, &own, *key, state, sum);
+                    depth = depth.max(touch.pair(&mut own, keys[slot], state, sum));
                 }
             }
-            if touches {
-                touch.flags[status::TOUCHING[2]].fetch_add(1, Ordering::Relaxed);
+            if depth > zero {
+                touch.give_all(&own.loads[0]);
+                touch.give_all(&own.loads[1]);
+                touching += 1;
+                deepest = deepest.max(depth);
             }
+        }
+        if touching > 0 {
+            touch.flags[status::TOUCHING[2]].fetch_add(touching, Ordering::Relaxed);
+            raise(&touch.flags[status::PENETRATION[2]], deepest);
         }
     }
 }

@@ -51,18 +51,21 @@ impl Kernel for Tie {
         for item in items {
             let (nodes, values) = (&ties[NODES * item..][..NODES], &table[VALUES * item..][..VALUES]);
             let held = nodes[0] as usize;
-            let corners = [0, 1, 2, 3].map(|a| (nodes[a + 1] as usize, values[a]));
+            let mut corners = [(held, constant(0.0)); 4];
+            for a in 0..4 {
+                corners[a] = (nodes[a + 1] as usize, values[a]);
+            }
             let spring = values[4];
             // from the tied node to its point on the face
             let mut gap = [constant(0.0); 3];
-            for (node, weight) in corners {
+            for &(node, weight) in &corners {
                 gap = fma(displacement.between(node, held), weight, gap);
             }
             *energies.at(0, item) = constant(0.5) * spring * dot(gap, gap);
             let one = (held, constant(1.0));
             add_pair(forces, flags, scale(gap, spring), real(params.force_quantum), [one], corners);
             let row_sum = constant(2.0) * spring;
-            let nodes = corners.into_iter().chain([one]);
+            let nodes = [corners[0], corners[1], corners[2], corners[3], one];
             add_stiffness(stiffness, row_sum, real(params.stiffness_quantum), nodes);
         }
     }

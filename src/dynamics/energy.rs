@@ -49,6 +49,7 @@ impl<const TOTAL: bool> Kernel for Kinetic<TOTAL> {
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let params: Params = io.params();
         let (velocity, mass) = (Field::new(io, slot!(Self::SLOTS, "velocity")), io.scalars(slot!(Self::SLOTS, "mass")));
+        let reference = if TOTAL { io.ints(slot!(Self::SLOTS, "reference", TOTAL)) } else { &[] };
         let plane = mass.len();
         let (half, quantum) = (L::Scalar::from_f64(0.5), L::Scalar::from_f64(QUANTUM));
         let mut totals = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "totals"));
@@ -56,10 +57,11 @@ impl<const TOTAL: bool> Kernel for Kinetic<TOTAL> {
             let sum = add_up(part(item, params.length, params.count), |node| {
                 let mut v = velocity.at(node);
                 if TOTAL {
-                    let reference = io.ints(slot!(Self::SLOTS, "reference", TOTAL));
-                    let x = [0, 1, 2].map(|k| {
-                        L::Scalar::from_i32(reference[node + k * plane].wrapping_sub(params.centre[k])) * quantum
-                    });
+                    let mut x = [quantum; 3];
+                    for k in 0..3 {
+                        let whole = reference[node + k * plane].wrapping_sub(params.centre[k]);
+                        x[k] = L::Scalar::from_i32(whole) * quantum;
+                    }
                     v = add(v, apply(&io.row.rate, x));
                 }
                 half * mass[node] * dot(v, v)

@@ -128,13 +128,7 @@ impl<'a, R: Real> RowSums<'a, R> {
             thread: io.uints(slot!(&rows(false), "thread_slots")),
             forces: io.scalars(slot!(&rows(false), "beam_force")),
             beams: io.scalars(slot!(&rows(false), "beams")),
-            bends: BENDING.then(|| Bends {
-                slots: io.uints(slot!(&rows(true), "bend_slots")),
-                table: io.scalars(slot!(&rows(true), "bends")),
-                energy: io.scalars(slot!(&rows(true), "bend_energy")),
-                force: io.scalars(slot!(&rows(true), "bend_force")),
-                rows: io.scalars(slot!(&rows(true), "bend_rows")),
-            }),
+            bends: if BENDING { Some(Bends::new(io)) } else { None },
             weights,
         }
     }
@@ -142,35 +136,66 @@ impl<'a, R: Real> RowSums<'a, R> {
     /// The row sum of a node, weighed if there are weights; the bounds of hexahedra are already weighed.
     #[inline(always)]
     fn of(&self, node: usize) -> R {
-        let size = |force: &[R]| norm([force[0], force[1], force[2]]);
         let one = R::from_f64(1.0);
         // the nodes of short lines have equal weights
-        let mut k = self.constant[node] * self.weights.as_ref().map_or(one, |w| w.rates[node]);
+        let weight = if let Some(weights) = &self.weights { weights.rates[node] } else { one };
+        let mut k = self.constant[node] * weight;
         if node < self.first_thread {
-            for &slot in self.slots[SOLID * node..][..SOLID].iter().filter(|slot| **slot != NONE) {
-                k = k + self.bounds[slot as usize];
+            for &slot in &self.slots[SOLID * node..][..SOLID] {
+                if slot != NONE {
+                    k = k + self.bounds[slot as usize];
+                }
             }
             return k;
         }
         let item = node - self.first_thread;
-        for &slot in self.thread[THREAD * item..][..THREAD].iter().filter(|slot| **slot != NONE) {
+        for &slot in &self.thread[THREAD * item..][..THREAD] {
+            if slot == NONE {
+                continue;
+            }
             let slot = slot as usize;
-            let both = self.weights.as_ref().map_or(one + one, |w| w.rates[w.end(slot, 0)] + w.rates[w.end(slot, 1)]);
+            let both = if let Some(weights) = &self.weights {
+                weights.rates[weights.end(slot, 0)] + weights.rates[weights.end(slot, 1)]
+            } else {
+                one + one
+            };
             let [length, axial] = [self.beams[TABLE * slot + 3], self.axial * self.beams[TABLE * slot + 4]];
             k = k + both * (size(&self.forces[3 * slot..][..3]) + axial) / length;
         }
         if let Some(Bends { slots, table, energy, force, rows }) = &self.bends {
-            let slots = slots[BENT * item..][..BENT].iter().enumerate();
-            for (place, &slot) in slots.filter(|(_, slot)| **slot != NONE) {
-                let slot = slot as usize;
+            let slots = &slots[BENT * item..][..BENT];
+            for place in 0..BENT {
+                if slots[place] == NONE {
+                    continue;
+                }
+                let slot = slots[place] as usize;
                 let rows = &rows[ROWS * slot..][..ROWS];
                 let bend = [table[BEND * slot], table[BEND * slot + 1]];
                 let force = size(&force[6 * slot..][..3]);
                 let row = rows[place] * stiffening(bend, energy[slot], force, rows[3]);
-                k = k + self.weights.as_ref().map_or(row, |weights| row * weights.mean(slot, rows));
+                k = k + if let Some(weights) = &self.weights { row * weights.mean(slot, rows) } else { row };
             }
         }
         k
+    }
+}
+
+/// Size of a force.
+#[inline(always)]
+fn size<R: Real>(force: &[R]) -> R {
+    norm([force[0], force[1], force[2]])
+}
+
+impl<'a, R: Real> Bends<'a, R> {
+    #[inline(always)]
+    fn new(io: &'a Io<R>) -> Self {
+        Self {
+            slots: io.uints(slot!(&rows(true), "bend_slots")),
+            table: io.scalars(slot!(&rows(true), "bends")),
+            energy: io.scalars(slot!(&rows(true), "bend_energy")),
+            force: io.scalars(slot!(&rows(true), "bend_force")),
+            rows: io.scalars(slot!(&rows(true), "bend_rows")),
+        }
     }
 }
 
@@ -185,8 +210,9 @@ impl<R: Real> Weights<'_, R> {
     #[inline(always)]
     fn mean(&self, bend: usize, rows: &[R]) -> R {
         let [first, second] = [self.pairs[2 * bend] as usize, self.pairs[2 * bend + 1] as usize];
-        let rates = [self.end(first, 0), self.end(first, 1), self.end(second, 1)].map(|node| self.rates[node]);
-        (rows[0] * rates[0] + rows[1] * rates[1] + rows[2] * rates[2]) / (rows[0] + rows[1] + rows[2])
+        let (a, b, c) =
+            (self.rates[self.end(first, 0)], self.rates[self.end(first, 1)], self.rates[self.end(second, 1)]);
+        (rows[0] * a + rows[1] * b + rows[2] * c) / (rows[0] + rows[1] + rows[2])
     }
 }
 
@@ -219,12 +245,12 @@ impl<const BENDING: bool, const MASS_ADDED: bool> Kernel for ElementLimit<BENDIN
         let least = L::Scalar::from_f64(f64::from(params.mass_per_stiffness));
         let rows = RowSums::new::<BENDING>(io, params, None);
         let masses = io.scalars(slot!(Self::SLOTS, "mass"));
-        let added = MASS_ADDED.then(|| io.scalars(slot!(Self::SLOTS, "added_mass", MASS_ADDED)));
+        let added = if MASS_ADDED { io.scalars(slot!(Self::SLOTS, "added_mass", MASS_ADDED)) } else { &[] };
         let mut limits = io.own::<L::Scalar>(slot!(Self::SLOTS, "limit"));
         for node in items {
             let k = rows.of(node);
             *limits.at(0, node) = k;
-            let mass = added.map_or(masses[node], |added| masses[node] + added[node]);
+            let mass = if MASS_ADDED { masses[node] + added[node] } else { masses[node] };
             *limits.at(1, node) = k / mass.max(k * least);
         }
     }
@@ -271,8 +297,10 @@ impl Kernel for HeldLimit {
         let conditions = io.uints(slot!(Self::SLOTS, "conditions"));
         let mut limits = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "limit"));
         let plane = limits.len() / 2;
-        for item in items.filter(|item| conditions[2 * item + 1] == 7) {
-            limits.set(plane + conditions[2 * item] as usize, L::Scalar::from_f64(0.0));
+        for item in items {
+            if conditions[2 * item + 1] == 7 {
+                limits.set(plane + conditions[2 * item] as usize, L::Scalar::from_f64(0.0));
+            }
         }
     }
 }

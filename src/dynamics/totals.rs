@@ -55,8 +55,8 @@ pub fn part(number: usize, length: u32, count: u32) -> Range<usize> {
 #[inline(always)]
 pub fn add_up<R: Real>(part: Range<usize>, mut term: impl FnMut(usize) -> R) -> R {
     let mut sums = [R::from_f64(0.0); WORKGROUP];
-    for (place, number) in part.enumerate() {
-        let sum = &mut sums[place % WORKGROUP];
+    for number in part.clone() {
+        let sum = &mut sums[(number - part.start) % WORKGROUP];
         *sum = *sum + term(number);
     }
     let mut half = WORKGROUP / 2;
@@ -74,25 +74,52 @@ const LOWEST: f64 = -1e30;
 
 /// The largest value of a part, and its index there; the first of equal ones.
 #[inline(always)]
-fn largest<R: Real>(part: Range<usize>, value: impl Fn(usize) -> R) -> (R, usize) {
+fn largest<R: Real>(part: Range<usize>, mut value: impl FnMut(usize) -> R) -> (R, usize) {
     let mut found = [(R::from_f64(LOWEST), 0); WORKGROUP];
-    for (place, number) in part.enumerate() {
+    for number in part.clone() {
+        let place = number - part.start;
         let value = value(number);
         let known = &mut found[place % WORKGROUP];
         if value > known.0 {
             *known = (value, place);
         }
     }
-    let first = found[0];
-    found[1..].iter().fold(first, |a, b| if b.0 > a.0 || b.0 == a.0 && b.1 < a.1 { *b } else { a })
+    let mut best = found[0];
+    for &other in &found[1..] {
+        if other.0 > best.0 || other.0 == best.0 && other.1 < best.1 {
+            best = other;
+        }
+    }
+    best
 }
 
-impl Params {
-    /// Index of a number of a column.
+/// Indices of the numbers of a column, one after the other, without a division for each.
+struct Places {
+    place: usize,
+    lane: usize,
+    lanes: usize,
+    /// From the end of adjacent numbers to the next of them.
+    gap: usize,
+}
+
+impl Places {
+    /// The indices from a number of a column on.
     #[inline(always)]
-    fn place(&self, number: usize, column: usize) -> usize {
-        let lanes = self.lanes as usize;
-        self.start as usize + number / lanes * self.stride as usize + column * lanes + number % lanes
+    fn new(params: &Params, number: usize, column: usize) -> Self {
+        let (lanes, stride) = (params.lanes as usize, params.stride as usize);
+        let lane = number % lanes;
+        let place = params.start as usize + number / lanes * stride + column * lanes + lane;
+        Self { place, lane, lanes, gap: stride - lanes }
+    }
+
+    #[inline(always)]
+    fn next(&mut self) -> usize {
+        let place = self.place;
+        (self.place, self.lane) = (place + 1, self.lane + 1);
+        if self.lane == self.lanes {
+            (self.place, self.lane) = (self.place + self.gap, 0);
+        }
+        place
     }
 }
 
@@ -118,17 +145,18 @@ impl<const TAKEN: bool> Kernel for Sum<TAKEN> {
         for item in items {
             let (number, column) = (item / columns, item % columns);
             let part = part(number, params.length, params.count);
+            let mut places = Places::new(&params, part.start, column);
             let sum = if TAKEN {
                 let mut source = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "source"));
-                add_up(part, |number| {
-                    let place = params.place(number, column);
+                add_up(part, |_| {
+                    let place = places.next();
                     let value = source.get(place);
                     source.set(place, L::Scalar::from_f64(0.0));
                     value
                 })
             } else {
                 let source = io.scalars(slot!(Self::SLOTS, "source"));
-                add_up(part, |number| source[params.place(number, column)])
+                add_up(part, |_| source[places.next()])
             };
             totals.set(params.into as usize + item, sum);
         }
@@ -162,13 +190,16 @@ impl<const JACOBIAN: bool> Kernel for Worst<JACOBIAN> {
         let mut totals = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "totals"));
         for item in items {
             let part = part(item, params.length, params.count);
+            let mut places = Places::new(&params, part.start, 0);
             let (value, place) = if JACOBIAN {
                 let used = io.uints(slot!(Self::SLOTS, "lanes_used", JACOBIAN));
-                let in_use = |number: usize| number % LANES < used[number / LANES] as usize;
                 let lowest = L::Scalar::from_f64(LOWEST);
-                largest(part, |n| if in_use(n) { -source[params.place(n, 0)] } else { lowest })
+                largest(part, |number| {
+                    let place = places.next();
+                    if number % LANES < used[number / LANES] as usize { -source[place] } else { lowest }
+                })
             } else {
-                largest(part, |number| source[params.place(number, 0)])
+                largest(part, |_| source[places.next()])
             };
             totals.set(params.into as usize + WORST * item, value);
             totals.set(params.into as usize + WORST * item + 1, L::Scalar::from_i32(place as i32));

@@ -75,11 +75,14 @@ impl<const PERIODIC: bool, const THERMAL: bool> Kernel for Beam2<PERIODIC, THERM
         let (ends, table) = (io.uints(slot!(Self::SLOTS, "ends")), io.scalars(slot!(Self::SLOTS, "beams")));
         let mut forces = io.own::<L::Scalar>(slot!(Self::SLOTS, "forces"));
         let mut tensions = io.own::<L::Scalar>(slot!(Self::SLOTS, "tensions"));
-        let mut virials = PERIODIC.then(|| io.own::<L::Scalar>(slot!(Self::SLOTS, "virial", PERIODIC)));
-        let mut thermal = THERMAL.then(|| {
+        let mut virials =
+            if PERIODIC { Some(io.own::<L::Scalar>(slot!(Self::SLOTS, "virial", PERIODIC))) } else { None };
+        let mut thermal = if THERMAL {
             let strains = io.scalars(slot!(Self::SLOTS, "thermal_strain", THERMAL));
-            (strains, io.own::<L::Scalar>(slot!(Self::SLOTS, "work", THERMAL)))
-        });
+            Some((strains, io.own::<L::Scalar>(slot!(Self::SLOTS, "work", THERMAL))))
+        } else {
+            None
+        };
         let two = L::Scalar::from_f64(2.0);
         for beam in items {
             let (reference, change) = vector::<_, PERIODIC>(table, ends, beam, &w, &io.row.gradient);

@@ -60,7 +60,8 @@ impl<const PERIODIC: bool> Kernel for Bend<PERIODIC> {
         let (ends, table) = (io.uints(slot!(Self::SLOTS, "ends")), io.scalars(slot!(Self::SLOTS, "beams")));
         let mut forces = io.own::<L::Scalar>(slot!(Self::SLOTS, "forces"));
         let mut energies = io.own::<L::Scalar>(slot!(Self::SLOTS, "energies"));
-        let mut virials = PERIODIC.then(|| io.own::<L::Scalar>(slot!(Self::SLOTS, "virial", PERIODIC)));
+        let mut virials =
+            if PERIODIC { Some(io.own::<L::Scalar>(slot!(Self::SLOTS, "virial", PERIODIC))) } else { None };
         let constant = L::Scalar::from_f64;
         debug_assert!(table.len() % TABLE == 0);
         for bend in items {

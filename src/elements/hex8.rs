@@ -97,8 +97,8 @@ fn derivatives<L: Lane>(u: &[L; 8]) -> [[L; 4]; 3] {
     for k in 0..3 {
         let (low, step) = EDGES[k];
         let mut d = [near; 4];
-        for (d, a) in d.iter_mut().zip(low) {
-            *d = u[a + step] - u[a];
+        for edge in 0..4 {
+            d[edge] = u[low[edge] + step] - u[low[edge]];
         }
         let first = [
             near.fma(d[0], far * d[1]),
@@ -121,7 +121,8 @@ fn derivatives<L: Lane>(u: &[L; 8]) -> [[L; 4]; 3] {
 fn corner_forces<L: Lane>(g: &[[L; 4]; 3]) -> [L; 8] {
     let (near, far) = (L::new(NEAR), L::new(FAR));
     let mut f = [L::new(0.0); 8];
-    for (g, (low, step)) in g.iter().zip(EDGES) {
+    for k in 0..3 {
+        let (g, (low, step)) = (&g[k], EDGES[k]);
         let first = [
             near.fma(g[0], far * g[2]),
             near.fma(g[1], far * g[3]),
@@ -134,9 +135,10 @@ fn corner_forces<L: Lane>(g: &[[L; 4]; 3]) -> [L; 8] {
             near.fma(first[2], far * first[3]),
             far.fma(first[2], near * first[3]),
         ];
-        for (a, d) in low.into_iter().zip(d) {
-            f[a + step] = f[a + step] + d;
-            f[a] = f[a] - d;
+        for edge in 0..4 {
+            let a = low[edge];
+            f[a + step] = f[a + step] + d[edge];
+            f[a] = f[a] - d[edge];
         }
     }
     f
@@ -213,8 +215,9 @@ struct Energies<L: Lane, M> {
 impl<L: Lane, M: Material> Visitor<L> for Energies<L, M> {
     #[inline(always)]
     fn point(&mut self, _: &Lanes<L>, _: usize, h: &Tensor<L>, volume: L) {
-        for (sum, w) in self.sum.iter_mut().zip(M::energy(&self.material, h)) {
-            *sum = w.fma(volume, *sum);
+        let energy = M::energy(&self.material, h);
+        for mode in 0..4 {
+            self.sum[mode] = energy[mode].fma(volume, self.sum[mode]);
         }
         self.smallest = self.smallest.min(jacobian(h));
     }
@@ -305,8 +308,8 @@ impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
             }
         }
         let mut across = slopes[1];
-        for (across, other) in across.iter_mut().zip(&slopes[2]) {
-            *across = other.fma(*other, *across * *across).sqrt();
+        for a in 0..8 {
+            across[a] = slopes[2][a].fma(slopes[2][a], slopes[1][a] * slopes[1][a]).sqrt();
         }
         let w = &self.weights;
         let sums = [total(&slopes[0], w), total(&slopes[1], w), total(&slopes[2], w)];

@@ -149,7 +149,10 @@ fn deformation<L: Lane, const PERIODIC: bool>(io: &Io<L::Scalar>, lanes: &Lanes<
         }
     }
     let q = lanes.frame(io);
-    let mut h = lanes.macroscopic::<PERIODIC>(io).unwrap_or([[zero; 3]; 3]);
+    let mut h = [[zero; 3]; 3];
+    if let Some(macroscopic) = lanes.macroscopic::<PERIODIC>(io) {
+        h = macroscopic;
+    }
     for i in 0..3 {
         for j in 0..3 {
             for k in 0..3 {
@@ -228,8 +231,9 @@ impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
                 let lanes = Lanes::<L>::new(io, SHAPE, item, lane);
                 let state = deformation::<_, PERIODIC>(io, &lanes, nodes as usize);
                 let out = out.item(0, item);
-                for (mode, w) in M::energy(&lanes.material(io), &state.h).into_iter().enumerate() {
-                    (w * lanes.shape(VOLUME)).store(&mut out[mode * LANES + lane..]);
+                let energy = M::energy(&lanes.material(io), &state.h);
+                for mode in 0..4 {
+                    (energy[mode] * lanes.shape(VOLUME)).store(&mut out[mode * LANES + lane..]);
                 }
                 jacobian(&state.h).store(&mut out[4 * LANES + lane..]);
                 let mut sum = L::new(0.0);
@@ -245,8 +249,8 @@ impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
 /// Adds the row sums of a stiffness matrix bounded by k times the products of its corner magnitudes.
 #[inline(always)]
 fn add_rows<L: Lane>(rows: &mut [L; 8], k_total: L, sizes: &[L; 8]) {
-    for (row, size) in rows.iter_mut().zip(sizes) {
-        *row = k_total.fma(*size, *row);
+    for corner in 0..8 {
+        rows[corner] = k_total.fma(sizes[corner], rows[corner]);
     }
 }
 

@@ -45,37 +45,32 @@ pub fn exp<L: Lane>(x: L) -> L {
     let n = (x * L::new(LOG2_E)).round();
     let r = n.fma(L::new(-LN2_LOW), n.fma(L::new(-LN2_HIGH), x));
     let terms = L::Scalar::EXP_TERMS;
-    let mut p = L::new(1.0 / factorial(terms));
+    let mut p = L::new(EXP[terms]);
     for k in (0..terms).rev() {
-        p = p.fma(r, L::new(1.0 / factorial(k)));
+        p = p.fma(r, L::new(EXP[k]));
     }
     p * n.exp2_whole()
 }
 
-const fn factorial(n: usize) -> f64 {
-    let mut f = 1.0;
-    let mut k = 2;
-    while k <= n {
-        f *= k as f64;
-        k += 1;
+/// Coefficients 1/n! of the series of e^x.
+const EXP: [f64; 15] = {
+    let mut coefficients = [1.0; 15];
+    let (mut factorial, mut n) = (1.0, 2);
+    while n < coefficients.len() {
+        factorial *= n as f64;
+        coefficients[n] = 1.0 / factorial;
+        n += 1;
     }
-    f
-}
+    coefficients
+};
 
 /// asinh(√u)/√u for u ≥ 0, without the singular derivatives of its factors at zero.
 #[inline(always)]
 pub fn asinh_ratio<L: Lane>(u: L) -> L {
-    // series Σ (−1)ⁿ (2n)!/(4ⁿ n!² (2n + 1)) uⁿ
-    let mut coefficients = [0.0; 10];
-    let mut c = 1.0;
-    for (n, coefficient) in coefficients.iter_mut().enumerate() {
-        *coefficient = c / (2 * n + 1) as f64;
-        c *= -((2 * n + 1) as f64) / (2 * n + 2) as f64;
-    }
     let terms = L::Scalar::ASINH_TERMS;
-    let mut series = L::new(coefficients[terms]);
+    let mut series = L::new(ASINH[terms]);
     for k in (0..terms).rev() {
-        series = series.fma(u, L::new(coefficients[k]));
+        series = series.fma(u, L::new(ASINH[k]));
     }
     let one = L::new(1.0);
     let s = u.max(L::new(1e-30)).sqrt();
@@ -83,6 +78,18 @@ pub fn asinh_ratio<L: Lane>(u: L) -> L {
     let far = log1p(s + u / (one + q)) / s;
     L::select(u.lt(L::new(0.01)), series, far)
 }
+
+/// Coefficients (−1)ⁿ (2n)!/(4ⁿ n!² (2n + 1)) of the series of asinh(√u)/√u.
+const ASINH: [f64; 10] = {
+    let mut coefficients = [0.0; 10];
+    let (mut c, mut n) = (1.0, 0);
+    while n < coefficients.len() {
+        coefficients[n] = c / (2 * n + 1) as f64;
+        c *= -((2 * n + 1) as f64) / (2 * n + 2) as f64;
+        n += 1;
+    }
+    coefficients
+};
 
 /// Smooth step from 0 to 1 with zero slope at both ends: t²(3 − 2t), constant outside.
 pub fn smooth(t: f64) -> f64 {

@@ -51,8 +51,11 @@ impl<'a, R: Real> Displacements<'a, R> {
     #[inline(always)]
     pub fn between(&self, a: usize, b: usize) -> Vector<R> {
         let (qa, ra, qb, rb) = (self.quanta.at(a), self.remainder.at(a), self.quanta.at(b), self.remainder.at(b));
-        let d = |k: usize| difference(qa[k], ra[k], qb[k], rb[k]);
-        [d(0), d(1), d(2)]
+        let mut apart = [R::from_f64(0.0); 3];
+        for k in 0..3 {
+            apart[k] = difference(qa[k], ra[k], qb[k], rb[k]);
+        }
+        apart
     }
 }
 
@@ -98,7 +101,10 @@ impl<'a> Lattice<'a> {
     #[inline(always)]
     pub fn between<R: Real>(&self, a: usize, b: usize, shift: [i32; 2]) -> Vector<R> {
         let (a, b, shift) = (self.quanta.at(a), self.quanta.at(b), [shift[0], shift[1], 0]);
-        let d = |k: usize| R::from_i32(a[k].wrapping_sub(b[k]).wrapping_add(shift[k])) * R::from_f64(QUANTUM);
-        [d(0), d(1), d(2)]
+        let mut apart = [R::from_f64(0.0); 3];
+        for k in 0..3 {
+            apart[k] = R::from_i32(a[k].wrapping_sub(b[k]).wrapping_add(shift[k])) * R::from_f64(QUANTUM);
+        }
+        apart
     }
 }

@@ -57,7 +57,7 @@ fn strain<L: Lane>(h: &Tensor<L>) -> Strain<L> {
             t[k][i] = t[i][k];
         }
     }
-    let row = [0, 1, 2].map(|k| cofactor(&t, 0, k));
+    let row = cofactors(&t, 0);
     let determinant = t[0][2].fma(row[2], t[0][1].fma(row[1], t[0][0] * row[0]));
     let second = row[0] + cofactor(&t, 1, 1) + cofactor(&t, 2, 2) + determinant;
     let x = t[0][0] + t[1][1] + t[2][2] + second;
@@ -89,7 +89,7 @@ impl Material for NeoHookean {
         }
         let mut pk2 = t;
         for i in 0..3 {
-            let row = [0, 1, 2].map(|k| cofactor(&c, i, k));
+            let row = cofactors(&c, i);
             for k in i..3 {
                 let strained = row[2].fma(t[2][k], row[1].fma(t[1][k], row[0] * t[0][k]));
                 pk2[i][k] = mu.fma(strained, pressure * row[k]);
@@ -122,6 +122,12 @@ impl Material for NeoHookean {
             tension: (p[MU] + (p[LAMBDA] * ln(j) - p[MU]) / stretch).max(zero),
         }
     }
+}
+
+/// A row of cofactors of a tensor.
+#[inline(always)]
+fn cofactors<L: Lane>(a: &Tensor<L>, row: usize) -> [L; 3] {
+    [cofactor(a, row, 0), cofactor(a, row, 1), cofactor(a, row, 2)]
 }
 
 /// A cofactor of a tensor.
