@@ -283,10 +283,14 @@ fn penalty(item: u32) {
         size = size + abs(points[POINT * item + a]);
     }
     let elapsed = row.dt_mid + row.dt_mid - row.dt;
-    let closing = row.approach * (0.5 * (1.0 + size)) * elapsed + full_radius * row.radius_increment;
+    var motion = vec3<f32>(0.0);
+    for (var a = 0u; a < CARRIED_BY; a++) {
+        motion = velocity_at(carried_by(item, a)) * points[POINT * item + a] + motion;
+    }
+    let closing = (norm(motion) + (row.approach - row.speed)) * elapsed + full_radius * row.radius_increment;
     let first_gap = (GAPS + params.faces) * item;
     let made = (MADE + params.slots) * item;
-    if keys[made] != near[first] {
+    if row.searched > 0.0 && keys[made] != near[first] {
         // a new list: all faces are evaluated. The penetration is kept; before the first list it may be anything up to `depth`
         let inner = select(gaps[first_gap + INNER], params.depth, keys[made] == EMPTY);
         keys[made] = near[first];

@@ -29,6 +29,8 @@ struct Row {
     damping_thread: f32,
     motion: f32,
     approach: f32,
+    speed: f32,
+    searched: f32,
 }
 
 @group(0) @binding(0) var<uniform> row: Row;

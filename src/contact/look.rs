@@ -151,6 +151,7 @@ impl<R: Real> Places<R> {
     #[inline(always)]
     fn set<const PERIODIC: bool>(&mut self, lane: usize, surface: &Surface<R, PERIODIC>, node: usize) {
         let (reference, (quanta, remainder)) = (surface.reference.at(node), surface.displacement.at(node));
+        let lane = lane % LANES;
         for k in 0..3 {
             self.reference[k][lane] = reference[k];
             self.quanta[k][lane] = quanta[k];
@@ -169,6 +170,7 @@ impl<R: Real> Places<R> {
     ) {
         let (reference, (quanta, remainder)) = (surface.reference.at(node), surface.displacement.at(node));
         let [x, y] = shift::<PERIODIC>(surface.period, image);
+        let lane = lane % LANES;
         for (k, shift) in [x, y, 0].into_iter().enumerate() {
             self.reference[k][lane] = reference[k].wrapping_sub(base.reference[k][lane]).wrapping_add(shift);
             self.quanta[k][lane] = quanta[k].wrapping_sub(base.quanta[k][lane]);

@@ -13,8 +13,7 @@ use super::look::{Glance, Look, Place, Seen, View};
 use super::memory::{CLOSED, DAMPED, ELASTIC, GAPS, INNER, Kept, LEAST, NORMAL, touch};
 use super::potential::{self, Nearest, Pushed, margin};
 use super::press::Joint;
-use super::rub::Rubbed;
-use super::sums::{SUM_ENERGY, SUM_RADIUS};
+use super::sums::SUM_ENERGY;
 use super::surface::{self, CARRIED, FACE, POINT, Surface, of_coded};
 use super::{EMPTY, Params, candidates, of_key, status, sums};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
@@ -24,8 +23,8 @@ use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::position;
 use crate::kernel::row::Row;
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel, Own, raise};
-use crate::kernel::vector::fma;
+use crate::kernel::stage::{Io, Kernel, Own};
+use crate::kernel::vector::{fma, norm};
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
@@ -77,7 +76,7 @@ pub(super) struct Step<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> 
     pub per_stiffness: R,
     pub flags: &'a [AtomicU32],
     /// Index of the kind of points in the status.
-    kind: usize,
+    pub kind: usize,
 }
 
 /// A point that looks at faces in this step.
@@ -86,26 +85,23 @@ pub(super) struct Walk<'a, R, const N: usize> {
     pub nodes: [usize; N],
     pub weights: [R; N],
     /// Radius before stitches are tightened, mm.
-    full_radius: R,
+    pub full_radius: R,
     /// Sum of the absolute weights.
     pub size: R,
-    /// The entries of its list.
+    /// The faces of its list.
     list: &'a [u32],
     /// Distance by which the bodies can have approached since the last look, mm.
     closed: R,
     /// Gap up to which a face can matter: the penetration that the point can have by now, with its margin, mm.
     most: R,
-    /// The bodies that it may touch, and the least gap to all others, mm.
+    /// The bodies that it may touch.
     bodies: Range<usize>,
-    least: R,
 }
 
 /// A body that a point may touch.
 struct Body<R> {
     walk: usize,
     key: u32,
-    /// Its faces in the list.
-    entries: Range<usize>,
     /// Faces looked at in the first and in the second look.
     glances: [Range<usize>; 2],
     pushed: Pushed<R>,
@@ -138,11 +134,15 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         }
     }
 
-    /// Largest closure of a gap since the previous positions, mm, for a point whose weights have the absolute sum `size`.
+    /// Largest closure of the gaps of a point since the previous positions, mm: by its own motion, that of the bodies, and the
+    /// growth of its radius.
     #[inline(always)]
-    fn closing(&self, size: R, full_radius: R) -> R {
-        let reach = R::from_f64(0.5) * (R::from_f64(1.0) + size);
-        self.row.approach * reach * self.elapsed + full_radius * self.row.radius_increment
+    fn closing<const N: usize>(&self, nodes: [usize; N], weights: [R; N], full_radius: R) -> R {
+        let mut own = [R::from_f64(0.0); 3];
+        for a in 0..N {
+            own = fma(self.velocity.at(nodes[a]), weights[a], own);
+        }
+        (norm(own) + (self.row.approach - self.row.speed)) * self.elapsed + full_radius * self.row.radius_increment
     }
 
     /// The body of an entry.
@@ -163,29 +163,21 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
     ) {
         let (number, walk) = walk;
         let first = bodies.len();
-        let mut end = 0;
-        while end < walk.list.len() && walk.list[end] != EMPTY {
-            let (start, key) = (end, self.body(walk.list[end]));
-            let mut nearest = R::from_f64(f64::from(self.params.skin));
-            while end < walk.list.len() && walk.list[end] != EMPTY && self.body(walk.list[end]) == key {
-                let gap = &mut kept.gaps[GAPS + end];
-                *gap = *gap - walk.closed;
-                nearest = nearest.min(*gap);
-                end += 1;
-            }
-            if nearest > walk.most {
-                walk.least = walk.least.min(nearest);
+        let gaps = &mut kept.gaps[GAPS..][..walk.list.len()];
+        for (place, &entry) in walk.list.iter().enumerate() {
+            gaps[place] = gaps[place] - walk.closed;
+            if gaps[place] > walk.most {
                 continue;
             }
-            let entries = start..end;
-            let looked_at = glances.len();
-            for place in entries.clone() {
-                if !(kept.gaps[GAPS + place] > walk.most) {
-                    glances.push(Glance { view: number, entry: walk.list[place], place, limit: walk.most });
+            let key = self.body(entry);
+            match bodies[first..].last_mut() {
+                Some(body) if body.key == key => body.glances[0].end += 1,
+                _ => {
+                    let glances = [glances.len()..glances.len() + 1, 0..0];
+                    bodies.push(Body { walk: number, key, glances, pushed: Pushed::none() });
                 }
             }
-            let glances = [looked_at..glances.len(), 0..0];
-            bodies.push(Body { walk: number, key, entries, glances, pushed: Pushed::none() });
+            glances.push(Glance { view: number, entry, place, limit: walk.most });
         }
         walk.bodies = first..bodies.len();
     }
@@ -201,11 +193,11 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         second: &mut Vec<Glance<R>>,
     ) {
         let limit = body.pushed.beyond() - view.radius;
-        for place in body.entries.clone() {
+        for (place, &entry) in walk.list.iter().enumerate() {
             let known = || body.glances[0].clone().any(|glance| first[glance].place == place && seen.is_close(glance));
             let gap = gaps[GAPS + place];
-            if gap > walk.most && gap <= limit && !known() {
-                second.push(Glance { view: body.walk, entry: walk.list[place], place, limit });
+            if gap > walk.most && gap <= limit && self.body(entry) == body.key && !known() {
+                second.push(Glance { view: body.walk, entry, place, limit });
             }
         }
     }
@@ -275,13 +267,13 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         (corners, carriers): (&mut Joint<4>, &mut Joint<N>),
     ) -> bool {
         let zero = R::from_f64(0.0);
-        let (mut least, mut inner) = (walk.least, zero);
+        let (mut least, mut inner) = (R::from_f64(f64::from(self.params.skin)), zero);
+        for place in 0..walk.list.len() {
+            least = least.min(kept.gaps[GAPS + place]);
+        }
         let (mut own, mut energy, mut touching) = ([0i32; 3], zero, false);
         for body in &mut bodies[walk.bodies.clone()] {
             let pushed = &mut body.pushed;
-            for place in body.entries.clone() {
-                least = least.min(kept.gaps[GAPS + place]);
-            }
             let depth = if pushed.is_behind(&self.params, walk.most) { pushed.push_out(view) } else { zero };
             inner = inner.max(depth);
             if let Some(rubbed) = self.settle((walk, view), (body.key, depth), pushed, kept, carriers) {
@@ -307,44 +299,6 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         }
         touching
     }
-
-    /// Damping, friction, and the end of a body's touch; returns the forces if it still touches.
-    #[inline(always)]
-    fn settle<const N: usize>(
-        &self,
-        (walk, view): (&Walk<R, N>, &View<R>),
-        (body, depth): (u32, R),
-        pushed: &mut Pushed<R>,
-        kept: &mut Kept<R>,
-        carriers: &mut Joint<N>,
-    ) -> Option<Rubbed<R>> {
-        let (zero, size) = (R::from_f64(0.0), const { touch(FRICTION) });
-        let touches = pushed.features > zero;
-        let keys = &mut kept.keys[MADE..];
-        let slot = place_of(keys, body, touches)?;
-        let touch = &mut kept.touches[size * slot..][..size];
-        let rubbed = self.rub((walk, view), pushed, touch, kept.sums);
-        self.stiffen(walk, rubbed.rows, carriers);
-        let work = pushed.pressing * walk.full_radius * self.row.radius_increment;
-        kept.sums[SUM_RADIUS] = kept.sums[SUM_RADIUS] + work;
-        if !touches {
-            keys[slot] = EMPTY;
-            touch.fill(zero);
-            return None;
-        }
-        keys[slot] = body;
-        let outside = (view.radius - pushed.nearest.distance).max(zero);
-        raise(&self.flags[status::PENETRATION[self.kind]], if depth > zero { view.radius + depth } else { outside });
-        Some(rubbed)
-    }
-}
-
-/// The index of a body among the touches of a point; if it `begins` to touch, a free index (there are as many as bodies in a
-/// list). `None` if it does not touch.
-#[inline(always)]
-fn place_of(keys: &[u32], key: u32, begins: bool) -> Option<usize> {
-    let known = keys.iter().position(|known| *known == key);
-    known.or_else(|| if begins { keys.iter().position(|known| *known == EMPTY) } else { None })
 }
 
 impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for Penalty<THREAD, FRICTION, PERIODIC> {
@@ -489,28 +443,29 @@ fn points_in_reach<'a, R: Real, const N: usize, const FRICTION: bool, const PERI
 ) {
     let (nodes, values) = (io.uints(slot!(&SLOTS, "nodes")), io.scalars(slot!(&SLOTS, "points")));
     let near = io.uints(slot!(&SLOTS, "near"));
-    let (zero, faces) = (R::from_f64(0.0), step.params.faces as usize);
+    let (zero, faces, is_listed_anew) =
+        (R::from_f64(0.0), step.params.faces as usize, io.row.searched > R::from_f64(0.0));
     for item in items {
-        let (coded, list) = nodes[CARRIED * item..][..CARRIED].split_at(CARRIED - 1);
-        let list = &near[(MADE + faces) * list[0] as usize..][..MADE + faces];
+        let coded = &nodes[CARRIED * item..][..CARRIED];
+        let row = (MADE + faces) * coded[CARRIED - 1] as usize;
         let values = &values[POINT * item..][..POINT];
-        let (mut weights, mut size) = ([zero; N], zero);
+        let (mut own, mut places, mut weights, mut size) = ([0; N], [0; N], [zero; N], zero);
         for a in 0..N {
-            weights[a] = values[a];
+            (own[a], places[a], weights[a]) = (coded[a], of_coded(coded[a]).0, values[a]);
             size = size + weights[a].abs();
         }
         let kept = &mut memory.of(item);
-        kept.renew(list[0], R::from_f64(f64::from(step.params.depth)));
-        let closing = step.closing(size, values[5]);
+        if is_listed_anew {
+            kept.renew(near[row], R::from_f64(f64::from(step.params.depth)));
+        }
+        let closing = step.closing(places, weights, values[5]);
         let closed = kept.gaps[CLOSED] + closing;
         if closed < kept.gaps[LEAST] {
             kept.gaps[CLOSED] = closed;
             continue;
         }
-        let (mut own, mut places) = ([0; N], [0; N]);
-        for a in 0..N {
-            (own[a], places[a]) = (coded[a], of_coded(coded[a]).0);
-        }
+        let list = &near[row + MADE..][..faces];
+        let count = list.iter().position(|entry| *entry == EMPTY).unwrap_or(faces);
         let radius = values[5] * io.row.radius;
         let deepest = kept.gaps[INNER] + closing;
         walks.push(Walk {
@@ -519,11 +474,10 @@ fn points_in_reach<'a, R: Real, const N: usize, const FRICTION: bool, const PERI
             weights,
             full_radius: values[5],
             size,
-            list: &list[MADE..],
+            list: &list[..count],
             closed,
             most: deepest + margin(radius + deepest),
             bodies: 0..0,
-            least: R::from_f64(f64::from(step.params.skin)),
         });
         points.push((own, weights));
         views.push(View { base: places[0], from: ([zero; 3], [zero; 3]), radius, penalty: values[4] });

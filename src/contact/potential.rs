@@ -156,18 +156,7 @@ impl<R: Real> Pushed<R> {
         let nearest = Nearest { found: false, entry: EMPTY, away: [zero; 3], distance: zero, height: zero };
         let (push, motion, apart) = ([zero; 3], [zero; 3], [zero; 3]);
         let (energy, pressing, features, shared, inverse) = (zero, zero, zero, zero, zero);
-        Self {
-            nearest,
-            inside: false,
-            push,
-            energy,
-            pressing,
-            features,
-            shared,
-            motion,
-            apart,
-            inverse,
-        }
+        Self { nearest, inside: false, push, energy, pressing, features, shared, motion, apart, inverse }
     }
 
     /// Whether a place is nearer than the known one. If several faces share the nearest edge or corner, the face seen most

@@ -2,14 +2,17 @@
 //! body, along and across the resultant, against the mean motion of the pushing faces, weighted by their forces: a choice of one
 //! wall of a valley would jump from step to step.
 
+use super::candidates::MADE;
 use super::friction::slide;
 use super::look::View;
-use super::memory::{DAMPED, ELASTIC, NORMAL};
+use super::memory::{DAMPED, ELASTIC, Kept, NORMAL, touch};
 use super::penalty::{Step, Walk};
 use super::potential::Pushed;
-use super::sums::{SUM_DAMPING, SUM_FRICTION, SUM_SLIP};
-use super::Params;
+use super::press::Joint;
+use super::sums::{SUM_DAMPING, SUM_FRICTION, SUM_RADIUS, SUM_SLIP};
+use super::{EMPTY, Params, status};
 use crate::kernel::lane::Real;
+use crate::kernel::stage::raise;
 use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
 
 /// Damping and friction force on a point, N, and an upper bound of its total stiffness against a body, N/mm.
@@ -29,7 +32,7 @@ impl<R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'_, R, FRICTION, 
     /// Damping and friction, once per point and body: against the mean motion of the pushing faces, weighted by their forces.
     /// An existing touch continues with its state.
     #[inline(always)]
-    pub(super) fn rub<const N: usize>(
+    fn rub<const N: usize>(
         &self,
         (walk, view): (&Walk<R, N>, &View<R>),
         pushed: &mut Pushed<R>,
@@ -73,4 +76,42 @@ impl<R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'_, R, FRICTION, 
         let rows = (R::from_f64(1.0) + walk.size) * (view.penalty * pushed.features + viscosity * (two / self.row.dt));
         Rubbed { force, rows }
     }
+
+    /// Damping, friction, and the end of a body's touch; returns the forces if it still touches.
+    #[inline(always)]
+    pub(super) fn settle<const N: usize>(
+        &self,
+        (walk, view): (&Walk<R, N>, &View<R>),
+        (body, depth): (u32, R),
+        pushed: &mut Pushed<R>,
+        kept: &mut Kept<R>,
+        carriers: &mut Joint<N>,
+    ) -> Option<Rubbed<R>> {
+        let (zero, size) = (R::from_f64(0.0), const { touch(FRICTION) });
+        let touches = pushed.features > zero;
+        let keys = &mut kept.keys[MADE..];
+        let slot = place_of(keys, body, touches)?;
+        let touch = &mut kept.touches[size * slot..][..size];
+        let rubbed = self.rub((walk, view), pushed, touch, kept.sums);
+        self.stiffen(walk, rubbed.rows, carriers);
+        let work = pushed.pressing * walk.full_radius * self.row.radius_increment;
+        kept.sums[SUM_RADIUS] = kept.sums[SUM_RADIUS] + work;
+        if !touches {
+            keys[slot] = EMPTY;
+            touch.fill(zero);
+            return None;
+        }
+        keys[slot] = body;
+        let outside = (view.radius - pushed.nearest.distance).max(zero);
+        raise(&self.flags[status::PENETRATION[self.kind]], if depth > zero { view.radius + depth } else { outside });
+        Some(rubbed)
+    }
+}
+
+/// The index of a body among the touches of a point; if it `begins` to touch, a free index (there are as many as bodies in a
+/// list). `None` if it does not touch.
+#[inline(always)]
+fn place_of(keys: &[u32], key: u32, begins: bool) -> Option<usize> {
+    let known = keys.iter().position(|known| *known == key);
+    known.or_else(|| if begins { keys.iter().position(|known| *known == EMPTY) } else { None })
 }

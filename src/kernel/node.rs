@@ -23,7 +23,9 @@ impl<'a, T: Copy> Planes<'a, T> {
     #[inline(always)]
     fn at(&self, node: usize) -> [T; 3] {
         let [x, y, z] = self.values;
-        [x[node], y[node], z[node]]
+        assert!(node < x.len());
+        // SAFETY: the planes have the same length.
+        unsafe { [*x.get_unchecked(node), *y.get_unchecked(node), *z.get_unchecked(node)] }
     }
 }
 

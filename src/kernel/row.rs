@@ -31,6 +31,10 @@ pub struct Row<R> {
     pub motion: R,
     /// Upper bound of the approach speed of two near bodies, mm/s.
     pub approach: R,
+    /// Upper bound of the speed of a node, mm/s; the approach speed contains it twice.
+    pub speed: R,
+    /// Zero if contact has surely not been searched since the previous step, else one.
+    pub searched: R,
 }
 
 impl Row<f64> {
@@ -50,6 +54,8 @@ impl Row<f64> {
             damping_thread: r(self.damping_thread),
             motion: r(self.motion),
             approach: r(self.approach),
+            speed: r(self.speed),
+            searched: r(self.searched),
         }
     }
 }

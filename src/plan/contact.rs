@@ -291,7 +291,7 @@ impl ContactScene<'_> {
             status,
         ];
         let kernel = flagged!(penalty::Penalty; thread, friction, periodic);
-        b.plan.step.push(Stage::new(names.step, kernel, (count, 64), &wires, params).beside());
+        b.plan.step.push(Stage::new(names.step, kernel, (count, 128), &wires, params).beside());
         FaceBuffers { sums, carriers, near, gaps, keys, touches, found }
     }
 

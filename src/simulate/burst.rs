@@ -22,11 +22,14 @@ impl Simulation {
             let first = if step == 0 && looked_at { back } else { 0.5 * back };
             let second = if step + 1 == steps && looks { 0.0 } else { 0.5 * ahead };
             let affine = largest(row.rate);
-            let approach = 2.0 * SPEED_MARGIN * self.speed + 2.0 * affine * AFFINE_REACH;
-            rows.push(Row { approach, thermal_increment: first + second, ..row });
+            let speed = SPEED_MARGIN * self.speed;
+            let approach = 2.0 * speed + 2.0 * affine * AFFINE_REACH;
+            let searched = if step == 0 && self.is_listed_anew { 1.0 } else { 0.0 };
+            rows.push(Row { approach, speed, searched, thermal_increment: first + second, ..row });
             self.dt_before = self.dt;
             time += self.dt;
         }
+        self.is_listed_anew = false;
         let last = rows.len() - usize::from(looks);
         self.backend.run(&self.model.plan.step, &rows[..last]);
         self.time = time;

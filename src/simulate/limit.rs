@@ -104,6 +104,7 @@ impl Simulation {
             radius_increment: 0.0,
             motion: 0.0,
             approach: 0.0,
+            speed: 0.0,
             ..row
         };
         let changing = self.changing();

@@ -92,6 +92,8 @@ pub struct Simulation {
     /// Factor on the time step: below one after a rollback.
     share: f64,
     searches: u64,
+    /// Whether the lists of candidates may have been made anew since the last step.
+    is_listed_anew: bool,
     /// Slave nodes and beams searched since the last full search.
     searched: u64,
     /// Seconds in stages of earlier backends, which were replaced when tables grew.
@@ -159,6 +161,7 @@ impl Simulation {
             dt_before: 0.0,
             share: 1.0,
             searches: 0,
+            is_listed_anew: true,
             searched: 0,
             spent_before: Vec::new(),
             speed: 1e9,

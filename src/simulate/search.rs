@@ -36,6 +36,7 @@ impl Simulation {
         if self.model.plan.search.is_empty() {
             return Ok(());
         }
+        self.is_listed_anew = true;
         let mut crowded = None;
         for _ in 0..8 {
             let row = self.row(self.time, self.dt, self.dt_before);
