@@ -14,6 +14,11 @@ fn raise(place: u32, value: f32) {
         atomicMax(&status[place], bits);
     }
 }
+
+// Largest speed of the nodes of yarns (0) or threads (1) in the last step, mm/s.
+fn speed_of(kind: u32) -> f32 {
+    return bitcast<f32>(atomicLoad(&status[FASTEST + kind]));
+}
 #endif
 
 #if PARAMS

@@ -4,11 +4,8 @@
 
 #if ROOT
 #if CONTACT
-#if MASS_ADDED
-#else
 #define STATUS
 #include "contact/mod"
-#endif
 #endif
 
 struct Params {
@@ -54,6 +51,13 @@ fn bend_at(slot: u32, k: u32) -> vec3<f32> {
 fn assemble(node: u32) {
     let plane = arrayLength(&mass);
     var force = vec3<f32>();
+#if CONTACT
+    if node == 0u {
+        // contact has read the speeds; integration finds those of this step
+        atomicStore(&status[FASTEST], 0u);
+        atomicStore(&status[FASTEST + 1u], 0u);
+    }
+#endif
     if node < params.first_thread {
         for (var k = 0u; k < SOLID; k++) {
             let slot = solid_slots[SOLID * node + k];

@@ -12,6 +12,9 @@ fn factors(damping: f32, dt: f32) -> vec2<f32> {
 #endif
 
 #if ROOT
+#define STATUS
+#include "contact/mod"
+
 struct Params {
     first_thread: u32,
     gravity_x: f32,
@@ -45,6 +48,7 @@ fn integrate(node: u32) {
     let gravity = vec3<f32>(params.gravity_x, params.gravity_y, params.gravity_z);
     var fallen = 0.0;
 #endif
+    var square = 0.0;
     for (var k = 0u; k < 3u; k++) {
         let at = node + k * plane;
         var a = acceleration[at];
@@ -81,7 +85,9 @@ fn integrate(node: u32) {
         var r = remainder[at] + new_v * row.dt;
         quanta[at] = carry(quanta[at], &r);
         remainder[at] = r;
+        square = square + new_v * new_v;
     }
+    raise(FASTEST + select(1u, 0u, node < params.first_thread), sqrt(square));
 #if DAMPING
     work[node] = work[node] + damped;
 #endif

@@ -28,8 +28,7 @@ struct Row {
     damping_solid: f32,
     damping_thread: f32,
     motion: f32,
-    approach: f32,
-    speed: f32,
+    affine: f32,
     searched: f32,
 }
 

@@ -45,6 +45,7 @@ impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
         // force of the scene on the prescribed components, N, including weight
         Slot::row("reactions", Scalar, 3),
     ];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -90,6 +91,7 @@ impl Kernel for Hold {
     const SHADER: Shader =
         Shader { constants: &[&position::CONSTANTS], ..Shader::new("conditions/prescribed", "hold") };
     const SLOTS: &'static [Slot] = &[NODES, Slot::scatter("correction", Scalar)];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

@@ -71,6 +71,7 @@ pub struct FillBeams<const PERIODIC: bool>;
 impl Kernel for Clear {
     const SHADER: Shader = Shader::new("contact/grid", "clear");
     const SLOTS: &'static [Slot] = &[Slot::row("counts", Uint, 1)];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -345,6 +346,7 @@ impl<const PERIODIC: bool> Kernel for FillSlabs<PERIODIC> {
             &GRID,
         ),
     );
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -404,6 +406,7 @@ impl<const PERIODIC: bool> Kernel for FillBeams<PERIODIC> {
             &GRID,
         ),
     );
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

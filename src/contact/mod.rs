@@ -125,6 +125,8 @@ pub mod status {
     pub const CULPRIT: usize = 10;
     /// Number of carriers and beams whose candidates were searched.
     pub const SEARCHED: usize = 11;
+    /// Largest speed of a node of a yarn and of a thread in the last step, bits of an f32, mm/s.
+    pub const FASTEST: [usize; 2] = [12, 13];
     /// Size of the buffer.
     pub const SIZE: usize = 16;
 
@@ -139,10 +141,10 @@ pub mod status {
     /// A displacement left the range of its quanta.
     pub const OUT_OF_RANGE: u32 = 16;
 
-    /// Status constants shared with the twins; places that exist per kind of pair are given for threads on yarns, the first kind.
-    pub const CONSTANTS: [Constant; 13] = constants![
+    /// Status constants shared with the twins; places that exist per kind are given for the first kind.
+    pub const CONSTANTS: [Constant; 14] = constants![
         uint: FLAGS, TRAVEL, PENETRATION = PENETRATION[0], CONTACT_RATE, TOUCHING = TOUCHING[0], SPEED, CULPRIT, SEARCHED,
-            CELL_FULL, SLOTS_FULL, FORCE_RANGE, NOT_FINITE, OUT_OF_RANGE
+            FASTEST = FASTEST[0], CELL_FULL, SLOTS_FULL, FORCE_RANGE, NOT_FINITE, OUT_OF_RANGE
     ];
 }
 

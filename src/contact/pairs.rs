@@ -283,6 +283,7 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
         ..Shader::new("contact/pairs", "pairs")
     };
     const SLOTS: &'static [Slot] = &PAIRS;
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

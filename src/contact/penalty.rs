@@ -23,7 +23,7 @@ use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::position;
 use crate::kernel::row::Row;
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel, Own};
+use crate::kernel::stage::{Io, Kernel, Own, read};
 use crate::kernel::vector::{fma, norm};
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
@@ -66,6 +66,8 @@ pub(super) struct Step<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> 
     pub row: &'a Row<R>,
     /// Time since the previous positions, s.
     pub elapsed: R,
+    /// Largest speed of the nodes of yarns over this time, mm/s.
+    fastest: R,
     surface: Surface<'a, R, PERIODIC>,
     pub velocity: Field<'a, R>,
     pub mass: &'a [R],
@@ -112,9 +114,11 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
     #[inline(always)]
     fn new(io: &'a Io<R>, kind: usize) -> Self {
         let params: Params = io.params();
+        let flags = io.atomic_uints(slot!(&SLOTS, "status"));
         Self {
             params,
             row: io.row,
+            fastest: read(&flags[status::FASTEST[0]]),
             elapsed: io.row.dt_mid + io.row.dt_mid - io.row.dt,
             surface: Surface {
                 faces: io.uints(slot!(&SLOTS, "faces")),
@@ -129,7 +133,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
             stiffness: io.atomics(slot!(&SLOTS, "stiffness")),
             per_force: R::from_f64(1.0 / f64::from(params.force_quantum)),
             per_stiffness: R::from_f64(1.0 / f64::from(params.stiffness_quantum)),
-            flags: io.atomic_uints(slot!(&SLOTS, "status")),
+            flags,
             kind,
         }
     }
@@ -142,7 +146,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         for a in 0..N {
             own = fma(self.velocity.at(nodes[a]), weights[a], own);
         }
-        (norm(own) + (self.row.approach - self.row.speed)) * self.elapsed + full_radius * self.row.radius_increment
+        (norm(own) + self.fastest + self.row.affine) * self.elapsed + full_radius * self.row.radius_increment
     }
 
     /// The body of an entry.

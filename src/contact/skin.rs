@@ -64,6 +64,7 @@ impl Kernel for Remember {
         Slot::planes("search_quanta", Int, 3),
         Slot::planes("search_remainder", Scalar, 3),
     ];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -92,6 +93,7 @@ impl<const CONTACT: bool> Kernel for Travel<CONTACT> {
         Slot::read("search_remainder", Scalar).when(CONTACT),
         Slot::atomic("status", Uint),
     ];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

@@ -19,6 +19,7 @@ impl<const PERIODIC: bool> Kernel for Slip<PERIODIC> {
     };
     // of each point, mm
     const SLOTS: &'static [Slot] = &[Slot::read("sums", Scalar), Slot::row("slipped", Scalar, 1)];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

@@ -18,7 +18,7 @@ use crate::kernel::node::Field;
 use crate::kernel::position;
 use crate::kernel::row::Row;
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel, raise};
+use crate::kernel::stage::{Io, Kernel, raise, read};
 use crate::kernel::vector::{add, apply, dot, fma, norm, scale, sub};
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
@@ -150,6 +150,8 @@ struct Touch<'a, R, const FRICTION: bool, const PERIODIC: bool> {
     growth: R,
     /// Time since the previous step, s.
     elapsed: R,
+    /// Upper bound of the approach speed of two near beams over this time, mm/s.
+    approach: R,
 }
 
 #[inline(always)]
@@ -162,6 +164,8 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
     fn new(io: &'a Io<R>) -> Self {
         let params: Params = io.params();
         let thick = real::<R>(2.0 * params.thread_radius);
+        let flags = io.atomic_uints(slot!(&FORCE, "status"));
+        let fastest: R = read(&flags[status::FASTEST[1]]);
         Self {
             scene: Scene::new(io, &params),
             row: io.row,
@@ -169,13 +173,14 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
             mass: io.scalars(slot!(&FORCE, "mass")),
             forces: io.atomics(slot!(&FORCE, "forces")),
             stiffness: io.atomics(slot!(&FORCE, "stiffness")),
-            flags: io.atomic_uints(slot!(&FORCE, "status")),
+            flags,
             params,
             per_force: R::from_f64(1.0) / real(params.force_quantum),
             per_stiffness: R::from_f64(1.0) / real(params.stiffness_quantum),
             reach: thick * io.row.radius,
             growth: thick * io.row.radius_increment,
             elapsed: io.row.dt_mid + io.row.dt_mid - io.row.dt,
+            approach: fastest + fastest + io.row.affine,
         }
     }
 
@@ -189,7 +194,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
             let state = &mut states[size * slot];
             if *state < zero {
                 let mean = R::from_f64(0.5) * (weights + self.scene.offsets.most_weights(of_key(keys[slot]).0));
-                *state = *state + self.row.approach * mean * self.elapsed + self.growth;
+                *state = *state + self.approach * mean * self.elapsed + self.growth;
             }
             can_touch |= !(*state < zero);
         }

@@ -36,6 +36,7 @@ impl Kernel for Tie {
         Slot::atomic("stiffness", Int),
         Slot::atomic("status", Uint),
     ];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

@@ -8,7 +8,7 @@
 //! same for elements alone, so that a few slivers at cut edges do not limit a scene. Without contact-aware mass scaling, the
 //! largest K/m of contact is reported for the choice of the time step.
 
-use crate::contact::status::{self, CONTACT_RATE};
+use crate::contact::status::{self, CONTACT_RATE, FASTEST};
 use crate::elements::{self, LANES};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, constants, slot};
@@ -17,6 +17,7 @@ use crate::kernel::shader::{Shader, when};
 use crate::kernel::stage::{Io, Kernel, raise};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
+use std::sync::atomic::Ordering;
 
 /// Corner slots gathered by a solid node.
 pub const SOLID: usize = 8;
@@ -90,7 +91,7 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
         Slot::row("contact_stiffness", Int, 1).when(CONTACT),
         // tonne
         Slot::row("added_mass", Scalar, 1).when(CONTACT && MASS_ADDED),
-        Slot::atomic("status", Uint).when(CONTACT && !MASS_ADDED),
+        Slot::atomic("status", Uint).when(CONTACT),
     ];
 
     #[inline(always)]
@@ -108,6 +109,12 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
         let mut acceleration = io.own::<L::Scalar>(slot!(Self::SLOTS, "acceleration"));
         let mut inverse = io.own::<L::Scalar>(slot!(Self::SLOTS, "inverse_mass"));
         let zero = L::Scalar::from_f64(0.0);
+        if CONTACT && items.start == 0 {
+            // contact has read the speeds; integration finds those of this step
+            let status = io.atomic_uints(slot!(Self::SLOTS, "status", CONTACT));
+            status[FASTEST[0]].store(0, Ordering::Relaxed);
+            status[FASTEST[1]].store(0, Ordering::Relaxed);
+        }
         for first in items.clone().step_by(BLOCK) {
             let count = BLOCK.min(items.end - first);
             let mut force = [[zero; BLOCK]; 3];
@@ -201,7 +208,7 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
                 mass[i] = mass[i] + added[i];
             }
         } else if touches {
-            let status = io.atomic_uints(slot!(Self::SLOTS, "status", CONTACT && !MASS_ADDED));
+            let status = io.atomic_uints(slot!(Self::SLOTS, "status", CONTACT));
             for i in 0..count {
                 if contact[i] > zero {
                     raise(&status[CONTACT_RATE], contact[i] / mass[i]);

@@ -4,12 +4,13 @@
 //! v⁺ = ((1 − α dt/2) v⁻ + a dt)/(1 + α dt/2), then w⁺ = w + v⁺ dt. Work is computed with the mean velocity (v⁻ + v⁺)/2, so the
 //! change of kinetic energy is exactly the work of all forces. Only active effects are computed and their work recorded.
 
-use crate::kernel::buffer::Kind::{Int, Scalar};
+use crate::contact::status;
+use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::{self, carry};
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel};
+use crate::kernel::stage::{Io, Kernel, raise};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
@@ -97,6 +98,7 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
         ],
         constants: &[
             &position::CONSTANTS,
+            &status::CONSTANTS,
             &constants![uint: INERTIA_PLANE = Self::WORKS.before_inertia(), GRAVITY_PLANE = Self::WORKS.before_gravity()],
         ],
         ..Shader::new("dynamics/integrate", "integrate")
@@ -113,6 +115,7 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
         Slot::planes("remainder", Scalar, 3),
         // work, mJ, one plane per kind, see [`Works`]
         Slot::planes("work", Scalar, Self::WORKS.count()).when(Self::WORKS.count() > 0),
+        Slot::atomic("status", Uint),
     ];
 
     #[inline(always)]
@@ -137,14 +140,19 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
         let border = params.first_thread as usize;
         let solids = items.start..items.end.min(border);
         let threads = items.start.max(border)..items.end;
-        for (nodes, damping) in [(solids, row.damping_solid), (threads, row.damping_thread)] {
+        let status = io.atomic_uints(slot!(Self::SLOTS, "status"));
+        for kind in 0..2 {
+            let (nodes, damping) =
+                if kind == 0 { (&solids, row.damping_solid) } else { (&threads, row.damping_thread) };
             let (keep, gain) = factors::<_, DAMPING>(damping, row.dt_mid);
+            let mut fastest = zero;
             for first in nodes.clone().step_by(BLOCK) {
                 let count = BLOCK.min(nodes.end - first);
                 let mass = if works.count() > 0 { &masses[first..][..count] } else { &[] };
                 let heavy = if GRAVITY { &true_masses[first..][..count] } else { &[] };
                 // effective mass beyond the nodal mass, and works summed over the axes
                 let [mut extra, mut damped, mut inertia, mut fallen] = [[zero; BLOCK]; 4];
+                let mut squares = [zero; BLOCK];
                 if MASS_ADDED {
                     for ((extra, inverse), mass) in extra.iter_mut().zip(&inverse[first..][..count]).zip(mass) {
                         *extra = if *inverse == zero { zero } else { L::Scalar::from_f64(1.0) / *inverse - *mass };
@@ -183,6 +191,12 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
                     for i in 0..count {
                         (q[i], r[i]) = carry(q[i], r[i] + new[i] * row.dt);
                     }
+                    for i in 0..count {
+                        squares[i] = squares[i] + new[i] * new[i];
+                    }
+                }
+                for i in 0..BLOCK {
+                    fastest = fastest.max(squares[i]);
                 }
                 let works = [(damped_plane, damped), (inertia_plane, inertia), (fallen_plane, fallen)];
                 for (plane, done) in works {
@@ -192,6 +206,7 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
                     }
                 }
             }
+            raise(&status[status::FASTEST[kind]], fastest.sqrt());
         }
     }
 }

@@ -42,6 +42,11 @@ pub trait Lane:
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
     /// Whether the mask holds in any lane.
     fn any(mask: Self::Mask) -> bool;
+    /// Whether the mask holds in all lanes.
+    #[inline(always)]
+    fn all(mask: Self::Mask) -> bool {
+        !Self::any(Self::new(0.5).lt(Self::select(mask, Self::new(0.0), Self::new(1.0))))
+    }
     /// `(m, e)` with `self = m 2^e` and m in [√½, √2), for positive normal numbers.
     fn mantissa_exponent(self) -> (Self, Self);
     /// `2^self` for whole numbers in the range of the exponent.

@@ -72,11 +72,15 @@ pub fn asinh_ratio<L: Lane>(u: L) -> L {
     for k in (0..terms).rev() {
         series = series.fma(u, L::new(ASINH[k]));
     }
+    let is_near = u.lt(L::new(0.01));
+    if L::all(is_near) {
+        return series;
+    }
     let one = L::new(1.0);
     let s = u.max(L::new(1e-30)).sqrt();
     let q = (one + u).sqrt();
     let far = log1p(s + u / (one + q)) / s;
-    L::select(u.lt(L::new(0.01)), series, far)
+    L::select(is_near, series, far)
 }
 
 /// Coefficients (−1)ⁿ (2n)!/(4ⁿ n!² (2n + 1)) of the series of asinh(√u)/√u.

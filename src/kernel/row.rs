@@ -29,10 +29,8 @@ pub struct Row<R> {
     pub damping_thread: R,
     /// Acceleration of the amplitude of prescribed motion, 1/s².
     pub motion: R,
-    /// Upper bound of the approach speed of two near bodies, mm/s.
-    pub approach: R,
-    /// Upper bound of the speed of a node, mm/s; the approach speed contains it twice.
-    pub speed: R,
+    /// Upper bound of the speed at which the macroscopic deformation brings two near bodies together, mm/s.
+    pub affine: R,
     /// Zero if contact has surely not been searched since the previous step, else one.
     pub searched: R,
 }
@@ -53,8 +51,7 @@ impl Row<f64> {
             damping_solid: r(self.damping_solid),
             damping_thread: r(self.damping_thread),
             motion: r(self.motion),
-            approach: r(self.approach),
-            speed: r(self.speed),
+            affine: r(self.affine),
             searched: r(self.searched),
         }
     }

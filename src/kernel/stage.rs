@@ -416,6 +416,12 @@ impl<T: Pod> Scatter<'_, T> {
     }
 }
 
+/// A number stored as the bits of an f32.
+#[inline(always)]
+pub fn read<R: Real>(place: &AtomicU32) -> R {
+    R::from_f64(f64::from(f32::from_bits(place.load(Ordering::Relaxed))))
+}
+
 /// Raises a shared maximum of non-negative numbers, stored as the bits of an f32.
 #[inline(always)]
 pub fn raise<R: Real>(place: &AtomicU32, value: R) {

@@ -129,9 +129,10 @@ pub(super) fn integrate(
     correction: Option<Buffer>,
 ) {
     let params = integrate::Params { first_thread: nodes.first_thread as u32, gravity: t.gravity() };
-    let &Nodes { acceleration, mass, true_mass, velocity, quanta, remainder, work, .. } = nodes;
+    let &Nodes { acceleration, mass, true_mass, velocity, quanta, remainder, work, status, .. } = nodes;
     let inverse_mass = added_mass.map(|_| nodes.inverse_mass);
-    let wires = wires![acceleration, mass, inverse_mass, correction, true_mass, velocity, quanta, remainder, work];
+    let wires =
+        wires![acceleration, mass, inverse_mass, correction, true_mass, velocity, quanta, remainder, work, status];
     let active = t.active;
     let kernel = flagged!(Integrate; active.fibre_lines, active.gravity, active.damping, active.contact_mass);
     b.plan.step.push(Stage::new("integrate", kernel, (nodes.count, NODE_GRAIN), &wires, params));

@@ -21,11 +21,9 @@ impl Simulation {
             let (back, ahead) = (row.thermal_increment, self.schedule.load(time + self.dt).thermal - row.thermal);
             let first = if step == 0 && looked_at { back } else { 0.5 * back };
             let second = if step + 1 == steps && looks { 0.0 } else { 0.5 * ahead };
-            let affine = largest(row.rate);
-            let speed = SPEED_MARGIN * self.speed;
-            let approach = 2.0 * speed + 2.0 * affine * AFFINE_REACH;
+            let affine = 2.0 * largest(row.rate) * AFFINE_REACH;
             let searched = if step == 0 && self.is_listed_anew { 1.0 } else { 0.0 };
-            rows.push(Row { approach, speed, searched, thermal_increment: first + second, ..row });
+            rows.push(Row { affine, searched, thermal_increment: first + second, ..row });
             self.dt_before = self.dt;
             time += self.dt;
         }

@@ -114,7 +114,9 @@ fn exception(model: &Model, buffer: Buffer) -> Option<Exception> {
 
 /// Whether a place of the status holds the bits of an f32.
 fn holds_bits(place: usize) -> bool {
-    status::PENETRATION.contains(&place) || [status::TRAVEL, status::CONTACT_RATE, status::SPEED].contains(&place)
+    status::PENETRATION.contains(&place)
+        || status::FASTEST.contains(&place)
+        || [status::TRAVEL, status::CONTACT_RATE, status::SPEED].contains(&place)
 }
 
 /// Rules for the numbers of a buffer that a stage writes.
@@ -323,7 +325,7 @@ fn compare(device: &Arc<Device>, simulation: &Simulation, findings: &mut Finding
         }
     }
     let (time, dt) = (simulation.time(), simulation.dt());
-    let row = Row { approach: 100.0, ..simulation.schedule.row(time, dt, dt, |_| [1.0; 2]) };
+    let row = Row { affine: 100.0, ..simulation.schedule.row(time, dt, dt, |_| [1.0; 2]) };
     for stage in stages(model).filter(|stage| !stage.items().is_empty()) {
         for buffer in stage.reads().iter().chain(stage.writes().iter().map(|(b, _)| b)) {
             gpu.set_bytes(*buffer, &cpu.bytes(*buffer));
