@@ -36,7 +36,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`error`] | the one error type: every message names its culprit |
-//! | [`kernel`] | shared by all backends: lanes, elementary functions, positions in quanta, buffers, kernel interfaces, stages, the text of shaders |
+//! | [`kernel`] | shared by all backends: lanes and pairs of registers, elementary functions, positions in quanta, buffers, work space, kernel interfaces, stages, the text of shaders |
 //! | [`settings`] | effects, load steps, integration, laws: plain structs with their JSON form |
 //! | [`mesh`] | nodes, blocks of hexahedra, threads, frames (deformed states), surfaces, quality |
 //! | [`materials`] | constitutive laws: energy, first Piola–Kirchhoff stress, stiffness |

@@ -130,7 +130,7 @@ impl Schedule {
         let next = self.load(time + dt);
         let f = gradient(now.angle, stretch(time));
         let old = gradient(last.angle, stretch((time - before).max(0.0)));
-        let mut row = Row { dt, dt_mid: 0.5 * (dt + before), searched: 1.0, ..Row::default() };
+        let mut row = Row { dt, dt_mid: 0.5 * (dt + before), closing: 1.0, searched: 1.0, ..Row::default() };
         for i in 0..2 {
             for j in 0..2 {
                 row.gradient[i][j] = f[i][j] - if i == j { 1.0 } else { 0.0 };

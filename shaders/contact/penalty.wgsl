@@ -287,7 +287,8 @@ fn penalty(item: u32) {
     for (var a = 0u; a < CARRIED_BY; a++) {
         motion = velocity_at(carried_by(item, a)) * points[POINT * item + a] + motion;
     }
-    let closing = (norm(motion) + speed_of(0u) + row.affine) * elapsed + full_radius * row.radius_increment;
+    let speed = norm(motion) + speed_of(0u) + row.affine;
+    let closing = row.closing * speed * elapsed + full_radius * row.radius_increment;
     let first_gap = (GAPS + params.faces) * item;
     let made = (MADE + params.slots) * item;
     if row.searched > 0.0 && keys[made] != near[first] {

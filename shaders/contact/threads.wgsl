@@ -51,7 +51,7 @@ fn can_touch(beam: u32) -> bool {
         let s = SLOT_STATE * slot;
         if states[s] < 0.0 {
             let mean = 0.5 * (weights + most_weights(of_key(keys[slot]).body));
-            states[s] = states[s] + (2.0 * speed_of(1u) + row.affine) * mean * elapsed() + growth_now();
+            states[s] = states[s] + row.closing * (2.0 * speed_of(1u) + row.affine) * mean * elapsed() + growth_now();
         }
         touches = touches || !(states[s] < 0.0);
     }

@@ -29,6 +29,7 @@ struct Row {
     damping_thread: f32,
     motion: f32,
     affine: f32,
+    closing: f32,
     searched: f32,
 }
 

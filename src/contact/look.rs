@@ -57,8 +57,9 @@ const ROWS: usize = 27;
 pub struct Seen<R> {
     /// Lower bound of the gap of each face, mm.
     pub bounds: Vec<R>,
-    /// Column of each face that was evaluated closely, else [`EMPTY`].
+    /// Column of each face that was evaluated closely, else [`EMPTY`], and the glances of the columns.
     columns: Vec<u32>,
+    close: Vec<u32>,
     corners: Table<R>,
     faces: Table<R>,
 }
@@ -332,7 +333,8 @@ impl<R: Real, const PERIODIC: bool> Work<R> for Look<'_, R, PERIODIC> {
         for first in (0..count).step_by(L::WIDTH) {
             self.corners::<L>(first);
         }
-        let mut close = Vec::with_capacity(count);
+        let mut close = std::mem::take(&mut self.seen.close);
+        close.clear();
         self.seen.columns.clear();
         for (number, glance) in self.glances.iter().enumerate() {
             let is_far = self.seen.bounds[number] > glance.limit;
@@ -345,5 +347,6 @@ impl<R: Real, const PERIODIC: bool> Work<R> for Look<'_, R, PERIODIC> {
         for (register, close) in close.chunks(L::WIDTH).enumerate() {
             self.closely::<L>(register * L::WIDTH, close);
         }
+        self.seen.close = close;
     }
 }

@@ -2,6 +2,7 @@
 
 use super::EMPTY;
 use crate::kernel::lane::Real;
+use crate::kernel::stage::Own;
 
 /// Numbers before the gaps of a point, mm: the least gap at the last evaluation of faces; the largest possible closure since
 /// then; the penetration, or an upper bound of it. Then the gap of every face of the list.
@@ -35,6 +36,27 @@ impl<R: Real> Kept<'_, R> {
             self.keys[0] = made;
             self.gaps.fill(R::from_f64(0.0));
             self.gaps[INNER] = inner;
+        }
+    }
+}
+
+/// The contact state of all points of a chunk.
+pub(super) struct Memory<'a, R> {
+    pub gaps: Own<'a, R>,
+    pub keys: Own<'a, u32>,
+    pub touches: Own<'a, R>,
+    pub sums: Own<'a, R>,
+}
+
+impl<R: Real> Memory<'_, R> {
+    /// The state of a point.
+    #[inline(always)]
+    pub fn of(&mut self, item: usize) -> Kept<'_, R> {
+        Kept {
+            gaps: self.gaps.item(0, item),
+            keys: self.keys.item(0, item),
+            touches: self.touches.item(0, item),
+            sums: self.sums.item(0, item),
         }
     }
 }

@@ -5,10 +5,11 @@
 //!
 //! Yarns have a closed `surface` of `face`s. Broad phase: `grid` sorts slabs of faces and beams into cells, and `candidates`
 //! lists the faces near each beam and each yarn node. Narrow phase: every step `penalty` applies the forces of the listed
-//! faces, the gradient of a `potential`, to the contact points, which `arc` places along beams. For beams on beams, `pairs`
-//! finds nearby beams, and `threads` applies the forces: `arc_offset` constructs the lines of threads, and `segments`
-//! integrates along them. Forces and contact stiffness are summed as integers, so the sum is independent of the order, and the
-//! forces of a pair cancel exactly.
+//! faces, the gradient of a `potential`, to the contact points, which `arc` places along beams. Points `look` at faces in
+//! registers, a face in each lane, with their results in a `table`; `rub` adds damping and friction, and `press` adds the forces
+//! to nodes. For beams on beams, `pairs` finds nearby beams, and `threads` applies the forces: `arc_offset` constructs the lines
+//! of threads, and `segments` integrates along them. Forces and contact stiffness are summed as integers, so the sum is
+//! independent of the order, and the forces of a pair cancel exactly.
 
 pub mod arc;
 pub mod arc_offset;

@@ -10,7 +10,7 @@
 
 use super::candidates::MADE;
 use super::look::{Glance, Look, Place, Seen, View};
-use super::memory::{CLOSED, DAMPED, ELASTIC, GAPS, INNER, Kept, LEAST, NORMAL, touch};
+use super::memory::{CLOSED, DAMPED, ELASTIC, GAPS, INNER, Kept, LEAST, Memory, NORMAL, touch};
 use super::potential::{self, Nearest, Pushed, margin};
 use super::press::Joint;
 use super::sums::SUM_ENERGY;
@@ -22,8 +22,9 @@ use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::position;
 use crate::kernel::row::Row;
+use crate::kernel::scratch;
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel, Own, read};
+use crate::kernel::stage::{Io, Kernel, read};
 use crate::kernel::vector::{fma, norm};
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
@@ -69,6 +70,8 @@ pub(super) struct Step<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> 
     /// Largest speed of the nodes of yarns over this time, mm/s.
     fastest: R,
     surface: Surface<'a, R, PERIODIC>,
+    /// Lists of near faces.
+    near: &'a [u32],
     pub velocity: Field<'a, R>,
     pub mass: &'a [R],
     pub forces: &'a [AtomicI32],
@@ -82,7 +85,7 @@ pub(super) struct Step<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> 
 }
 
 /// A point that looks at faces in this step.
-pub(super) struct Walk<'a, R, const N: usize> {
+pub(super) struct Walk<R, const N: usize> {
     item: usize,
     pub nodes: [usize; N],
     pub weights: [R; N],
@@ -90,8 +93,8 @@ pub(super) struct Walk<'a, R, const N: usize> {
     pub full_radius: R,
     /// Sum of the absolute weights.
     pub size: R,
-    /// The faces of its list.
-    list: &'a [u32],
+    /// The place of its list of faces.
+    list: Range<usize>,
     /// Distance by which the bodies can have approached since the last look, mm.
     closed: R,
     /// Gap up to which a face can matter: the penetration that the point can have by now, with its margin, mm.
@@ -127,6 +130,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
                 gradient: &io.row.gradient,
                 period: params.period,
             },
+            near: io.uints(slot!(&SLOTS, "near")),
             velocity: Field::new(io, slot!(&SLOTS, "velocity")),
             mass: io.scalars(slot!(&SLOTS, "mass")),
             forces: io.atomics(slot!(&SLOTS, "forces")),
@@ -146,7 +150,8 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         for a in 0..N {
             own = fma(self.velocity.at(nodes[a]), weights[a], own);
         }
-        (norm(own) + self.fastest + self.row.affine) * self.elapsed + full_radius * self.row.radius_increment
+        let speed = norm(own) + self.fastest + self.row.affine;
+        self.row.closing * speed * self.elapsed + full_radius * self.row.radius_increment
     }
 
     /// The body of an entry.
@@ -167,8 +172,9 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
     ) {
         let (number, walk) = walk;
         let first = bodies.len();
-        let gaps = &mut kept.gaps[GAPS..][..walk.list.len()];
-        for (place, &entry) in walk.list.iter().enumerate() {
+        let list = &self.near[walk.list.clone()];
+        let gaps = &mut kept.gaps[GAPS..][..list.len()];
+        for (place, &entry) in list.iter().enumerate() {
             gaps[place] = gaps[place] - walk.closed;
             if gaps[place] > walk.most {
                 continue;
@@ -197,7 +203,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         second: &mut Vec<Glance<R>>,
     ) {
         let limit = body.pushed.beyond() - view.radius;
-        for (place, &entry) in walk.list.iter().enumerate() {
+        for (place, &entry) in self.near[walk.list.clone()].iter().enumerate() {
             let known = || body.glances[0].clone().any(|glance| first[glance].place == place && seen.is_close(glance));
             let gap = gaps[GAPS + place];
             if gap > walk.most && gap <= limit && self.body(entry) == body.key && !known() {
@@ -341,112 +347,99 @@ fn run<R: Real, const N: usize, const FRICTION: bool, const PERIODIC: bool>(
     kind: usize,
 ) {
     let step = Step::<_, FRICTION, PERIODIC>::new(io, kind);
-    let mut memory = Memory::new(io);
-    let count = items.len();
-    let (mut walks, mut points) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    let mut views = Vec::with_capacity(count);
-    points_in_reach::<_, N, FRICTION, PERIODIC>(io, &step, items, &mut memory, &mut walks, &mut points, &mut views);
-    if walks.is_empty() {
-        return;
-    }
+    let mut memory = Memory {
+        gaps: io.own(slot!(&SLOTS, "gaps")),
+        keys: io.own(slot!(&SLOTS, "keys")),
+        touches: io.own(slot!(&SLOTS, "touches")),
+        sums: io.own(slot!(&SLOTS, "sums")),
+    };
+    let mut space = scratch::take::<Space<R, N>>();
+    let Space { walks, points, views, bodies, first, second, at_hand, farther } = &mut *space;
+    points_in_reach(io, &step, items, &mut memory, (walks, points, views));
     let surface = &step.surface;
     if N > 1 {
-        R::dispatch(io.isa, Place { surface, points: &points, views: &mut views });
+        R::dispatch(io.isa, Place { surface, points, views });
     }
-    let (mut bodies, mut first) = (Vec::with_capacity(count), Vec::with_capacity(2 * count));
-    let mut second = Vec::new();
+    bodies.clear();
+    first.clear();
+    second.clear();
     for (number, walk) in walks.iter_mut().enumerate() {
         let kept = &mut memory.of(walk.item);
-        step.begin((number, walk), kept, &mut bodies, &mut first);
+        step.begin((number, walk), kept, bodies, first);
     }
-    let (mut at_hand, mut farther) = (Seen::default(), Seen::default());
-    R::dispatch(io.isa, Look { surface, views: &views, glances: &first, seen: &mut at_hand });
-    for body in &mut bodies {
+    R::dispatch(io.isa, Look { surface, views, glances: first, seen: at_hand });
+    for body in &mut *bodies {
         let (walk, view) = (&walks[body.walk], &views[body.walk]);
         let kept = memory.of(walk.item);
         for glance in body.glances[0].clone() {
             let gap = &mut kept.gaps[GAPS + first[glance].place];
-            step.fold(&mut body.pushed, view, (glance, &first[glance]), walk.most, &at_hand, gap);
+            step.fold(&mut body.pushed, view, (glance, &first[glance]), walk.most, at_hand, gap);
         }
         // a point that seems to be inside is inside only if no other face is nearer
         if body.pushed.is_behind(&step.params, walk.most) {
             let start = second.len();
-            step.beyond(body, (walk, view), (&first, &at_hand), kept.gaps, &mut second);
+            step.beyond(body, (walk, view), (first, at_hand), kept.gaps, second);
             body.glances[1] = start..second.len();
         }
     }
     if !second.is_empty() {
-        R::dispatch(io.isa, Look { surface, views: &views, glances: &second, seen: &mut farther });
-        for body in &mut bodies {
+        R::dispatch(io.isa, Look { surface, views, glances: second, seen: farther });
+        for body in &mut *bodies {
             let (walk, view) = (&walks[body.walk], &views[body.walk]);
             let kept = memory.of(walk.item);
             for glance in body.glances[1].clone() {
                 let limit = body.pushed.beyond() - view.radius;
                 let gap = &mut kept.gaps[GAPS + second[glance].place];
                 if *gap <= limit {
-                    step.fold(&mut body.pushed, view, (glance, &second[glance]), limit, &farther, gap);
+                    step.fold(&mut body.pushed, view, (glance, &second[glance]), limit, farther, gap);
                 }
             }
         }
     }
     let (mut corners, mut carriers, mut touching) = (Joint::new(), Joint::new(), 0);
-    for (walk, view) in walks.iter().zip(&views) {
-        let looks = [(&first[..], &at_hand), (&second[..], &farther)];
+    for (walk, view) in walks.iter().zip(&*views) {
+        let looks = [(&first[..], &*at_hand), (&second[..], &*farther)];
         let kept = &mut memory.of(walk.item);
-        touching += u32::from(step.end((walk, view), &mut bodies, looks, kept, (&mut corners, &mut carriers)));
+        touching += u32::from(step.end((walk, view), bodies, looks, kept, (&mut corners, &mut carriers)));
     }
     corners.finish(step.forces, step.stiffness);
     carriers.finish(step.forces, step.stiffness);
     if touching > 0 {
         step.flags[status::TOUCHING[step.kind]].fetch_add(touching, Ordering::Relaxed);
     }
+    scratch::put_back(space);
 }
 
-/// The contact state of all points of a chunk.
-struct Memory<'a, R> {
-    gaps: Own<'a, R>,
-    keys: Own<'a, u32>,
-    touches: Own<'a, R>,
-    sums: Own<'a, R>,
-}
-
-impl<'a, R: Real> Memory<'a, R> {
-    #[inline(always)]
-    fn new(io: &'a Io<R>) -> Self {
-        Self {
-            gaps: io.own(slot!(&SLOTS, "gaps")),
-            keys: io.own(slot!(&SLOTS, "keys")),
-            touches: io.own(slot!(&SLOTS, "touches")),
-            sums: io.own(slot!(&SLOTS, "sums")),
-        }
-    }
-
-    /// The state of a point.
-    #[inline(always)]
-    fn of(&mut self, item: usize) -> Kept<'_, R> {
-        Kept {
-            gaps: self.gaps.item(0, item),
-            keys: self.keys.item(0, item),
-            touches: self.touches.item(0, item),
-            sums: self.sums.item(0, item),
-        }
-    }
+/// Work space of a chunk.
+#[derive(Default)]
+struct Space<R, const N: usize> {
+    walks: Vec<Walk<R, N>>,
+    /// Coded nodes and weights of points.
+    points: Vec<([u32; N], [R; N])>,
+    views: Vec<View<R>>,
+    bodies: Vec<Body<R>>,
+    /// Faces looked at first, and faces farther away looked at second.
+    first: Vec<Glance<R>>,
+    second: Vec<Glance<R>>,
+    at_hand: Seen<R>,
+    farther: Seen<R>,
 }
 
 /// The points whose bodies can have closed their least gap, with their coded nodes and weights, and their views, still without
 /// positions.
 #[inline(always)]
-fn points_in_reach<'a, R: Real, const N: usize, const FRICTION: bool, const PERIODIC: bool>(
-    io: &'a Io<R>,
+fn points_in_reach<R: Real, const N: usize, const FRICTION: bool, const PERIODIC: bool>(
+    io: &Io<R>,
     step: &Step<R, FRICTION, PERIODIC>,
     items: Range<usize>,
     memory: &mut Memory<R>,
-    walks: &mut Vec<Walk<'a, R, N>>,
-    points: &mut Vec<([u32; N], [R; N])>,
-    views: &mut Vec<View<R>>,
+    (walks, points, views): (&mut Vec<Walk<R, N>>, &mut Vec<([u32; N], [R; N])>, &mut Vec<View<R>>),
 ) {
+    walks.clear();
+    points.clear();
+    views.clear();
     let (nodes, values) = (io.uints(slot!(&SLOTS, "nodes")), io.scalars(slot!(&SLOTS, "points")));
-    let near = io.uints(slot!(&SLOTS, "near"));
+    let near = step.near;
     let (zero, faces, is_listed_anew) =
         (R::from_f64(0.0), step.params.faces as usize, io.row.searched > R::from_f64(0.0));
     for item in items {
@@ -478,7 +471,7 @@ fn points_in_reach<'a, R: Real, const N: usize, const FRICTION: bool, const PERI
             weights,
             full_radius: values[5],
             size,
-            list: &list[..count],
+            list: row + MADE..row + MADE + count,
             closed,
             most: deepest + margin(radius + deepest),
             bodies: 0..0,

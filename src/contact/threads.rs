@@ -180,7 +180,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
             reach: thick * io.row.radius,
             growth: thick * io.row.radius_increment,
             elapsed: io.row.dt_mid + io.row.dt_mid - io.row.dt,
-            approach: fastest + fastest + io.row.affine,
+            approach: io.row.closing * (fastest + fastest + io.row.affine),
         }
     }
 

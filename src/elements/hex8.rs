@@ -12,6 +12,7 @@ use crate::kernel::interface::{Constant, Slot, constants, slot};
 use crate::kernel::lane::Lane;
 use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
+use crate::kernel::two::Two;
 use crate::materials::{Material, PARAMETERS, Tensor, jacobian};
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -144,9 +145,31 @@ fn corner_forces<L: Lane>(g: &[[L; 4]; 3]) -> [L; 8] {
     f
 }
 
-/// An operation at each Gauss point of one register of hexahedra.
+/// An operation at each Gauss point of one register of hexahedra, which is given two points at a time.
 trait Visitor<L: Lane> {
-    fn point(&mut self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, volume: L);
+    fn points(&mut self, lanes: &Lanes<L>, points: [usize; 2], h: &Tensor<Two<L>>, volume: Two<L>);
+}
+
+/// The same numbers at both points.
+#[inline(always)]
+fn both<L: Lane, const N: usize>(numbers: &[L; N]) -> [Two<L>; N] {
+    let mut pairs = [Two(numbers[0], numbers[0]); N];
+    for i in 0..N {
+        pairs[i] = Two(numbers[i], numbers[i]);
+    }
+    pairs
+}
+
+/// A tensor at each of two points.
+#[inline(always)]
+fn apart<L: Lane>(a: &Tensor<Two<L>>) -> [Tensor<L>; 2] {
+    let mut tensors = [[[a[0][0].0; 3]; 3]; 2];
+    for i in 0..3 {
+        for j in 0..3 {
+            (tensors[0][i][j], tensors[1][i][j]) = (a[i][j].0, a[i][j].1);
+        }
+    }
+    tensors
 }
 
 /// Visits the Gauss points of one register of hexahedra, with H and the volume of the point.
@@ -160,16 +183,19 @@ fn visit<L: Lane, const PERIODIC: bool>(
     let u = local_displacements(io, lanes, nodes);
     let d = [derivatives(&u[0]), derivatives(&u[1]), derivatives(&u[2])];
     let macroscopic = lanes.macroscopic::<PERIODIC>(io);
-    for point in 0..8 {
-        let mut h = gradient(lanes, point, &d);
-        if let Some(macroscopic) = &macroscopic {
-            for i in 0..3 {
-                for j in 0..3 {
-                    h[i][j] = h[i][j] + macroscopic[i][j];
+    for point in (0..8).step_by(2) {
+        let (first, second) = (gradient(lanes, point, &d), gradient(lanes, point + 1, &d));
+        let mut h = [[Two(first[0][0], second[0][0]); 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                h[i][j] = Two(first[i][j], second[i][j]);
+                if let Some(macroscopic) = &macroscopic {
+                    h[i][j] = h[i][j] + Two(macroscopic[i][j], macroscopic[i][j]);
                 }
             }
         }
-        visitor.point(lanes, point, &h, lanes.shape(POINT * point + VOLUME));
+        let volume = |point: usize| lanes.shape(POINT * point + VOLUME);
+        visitor.points(lanes, [point, point + 1], &h, Two(volume(point), volume(point + 1)));
     }
 }
 
@@ -183,22 +209,25 @@ struct Stress<L: Lane, M, const PERIODIC: bool> {
 
 impl<L: Lane, M: Material, const PERIODIC: bool> Visitor<L> for Stress<L, M, PERIODIC> {
     #[inline(always)]
-    fn point(&mut self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, volume: L) {
-        let mut p = M::stress(&self.material, h);
-        let at = others(point);
+    fn points(&mut self, lanes: &Lanes<L>, points: [usize; 2], h: &Tensor<Two<L>>, volume: Two<L>) {
+        let mut p = M::stress(&both(&self.material), h);
         for i in 0..3 {
             for j in 0..3 {
                 p[i][j] = p[i][j] * volume;
                 if PERIODIC {
-                    self.sum[i][j] = self.sum[i][j] + p[i][j];
+                    self.sum[i][j] = self.sum[i][j] + p[i][j].0 + p[i][j].1;
                 }
             }
         }
-        for k in 0..3 {
-            let inverse = inverse(lanes, point, k);
-            for i in 0..3 {
-                let g = p[i][2].fma(inverse[2], p[i][1].fma(inverse[1], p[i][0] * inverse[0]));
-                self.forces[i][k][at[k]] = self.forces[i][k][at[k]] - g;
+        let p = apart(&p);
+        for point in 0..2 {
+            let (p, at) = (&p[point], others(points[point]));
+            for k in 0..3 {
+                let inverse = inverse(lanes, points[point], k);
+                for i in 0..3 {
+                    let g = p[i][2].fma(inverse[2], p[i][1].fma(inverse[1], p[i][0] * inverse[0]));
+                    self.forces[i][k][at[k]] = self.forces[i][k][at[k]] - g;
+                }
             }
         }
     }
@@ -214,12 +243,13 @@ struct Energies<L: Lane, M> {
 
 impl<L: Lane, M: Material> Visitor<L> for Energies<L, M> {
     #[inline(always)]
-    fn point(&mut self, _: &Lanes<L>, _: usize, h: &Tensor<L>, volume: L) {
-        let energy = M::energy(&self.material, h);
+    fn points(&mut self, _: &Lanes<L>, _: [usize; 2], h: &Tensor<Two<L>>, volume: Two<L>) {
+        let energy = M::energy(&both(&self.material), h);
         for mode in 0..4 {
-            self.sum[mode] = energy[mode].fma(volume, self.sum[mode]);
+            self.sum[mode] = energy[mode].1.fma(volume.1, energy[mode].0.fma(volume.0, self.sum[mode]));
         }
-        self.smallest = self.smallest.min(jacobian(h));
+        let j = jacobian(h);
+        self.smallest = self.smallest.min(j.0).min(j.1);
     }
 }
 
@@ -281,6 +311,15 @@ impl<L: Lane, M: Material> Bounds<L, M> {
 }
 
 impl<L: Lane, M: Material> Visitor<L> for Bounds<L, M> {
+    #[inline(always)]
+    fn points(&mut self, lanes: &Lanes<L>, points: [usize; 2], h: &Tensor<Two<L>>, volume: Two<L>) {
+        let h = apart(h);
+        self.point(lanes, points[0], &h[0], volume.0);
+        self.point(lanes, points[1], &h[1], volume.1);
+    }
+}
+
+impl<L: Lane, M: Material> Bounds<L, M> {
     #[inline(always)]
     fn point(&mut self, lanes: &Lanes<L>, point: usize, h: &Tensor<L>, volume: L) {
         let inverse = [inverse(lanes, point, 0), inverse(lanes, point, 1), inverse(lanes, point, 2)];

@@ -10,6 +10,8 @@ pub mod node;
 pub mod position;
 pub mod record;
 pub mod row;
+pub mod scratch;
 pub mod shader;
 pub mod stage;
+pub mod two;
 pub mod vector;

@@ -31,6 +31,8 @@ pub struct Row<R> {
     pub motion: R,
     /// Upper bound of the speed at which the macroscopic deformation brings two near bodies together, mm/s.
     pub affine: R,
+    /// Share of the motion that closes gaps: one, or zero while displacements are tried about a state.
+    pub closing: R,
     /// Zero if contact has surely not been searched since the previous step, else one.
     pub searched: R,
 }
@@ -52,6 +54,7 @@ impl Row<f64> {
             damping_thread: r(self.damping_thread),
             motion: r(self.motion),
             affine: r(self.affine),
+            closing: r(self.closing),
             searched: r(self.searched),
         }
     }

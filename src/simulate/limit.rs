@@ -6,7 +6,6 @@
 //! both.
 
 use super::Simulation;
-use crate::contact::status;
 use crate::error::{Error, Result};
 use crate::kernel::position::QUANTUM;
 use crate::kernel::row::Row;
@@ -99,13 +98,14 @@ impl Simulation {
             }
         }
         let row = self.row(self.time, self.dt, self.dt);
-        let row =
-            Row { rate: [[0.0; 3]; 3], thermal_increment: 0.0, radius_increment: 0.0, motion: 0.0, affine: 0.0, ..row };
-        // nothing moves between two evaluations but by the displacements themselves
-        let status = self.backend.uints(b.status);
-        let mut still = status.clone();
-        status::FASTEST.into_iter().for_each(|place| still[place] = 0);
-        self.backend.set_bytes(b.status, bytemuck::cast_slice(&still));
+        let row = Row {
+            rate: [[0.0; 3]; 3],
+            thermal_increment: 0.0,
+            radius_increment: 0.0,
+            motion: 0.0,
+            closing: 0.0,
+            ..row
+        };
         let changing = self.changing();
         self.backend.save(&changing);
         let first = self.health.dt_limit;
@@ -134,7 +134,6 @@ impl Simulation {
         }
         let motion = std::mem::take(&mut oscillation.motion);
         self.backend.restore();
-        self.backend.set_bytes(self.model.buffers.status, bytemuck::cast_slice(&status));
         let at = |node: usize| [0, 1, 2].map(|k| motion[node + k * nodes]);
         let size = |node: &usize| at(*node).iter().map(|x| x * x).sum::<f64>();
         let node = (0..nodes).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
