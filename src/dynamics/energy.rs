@@ -44,6 +44,7 @@ impl<const TOTAL: bool> Kernel for Kinetic<TOTAL> {
         Slot::read("reference", Int).when(TOTAL),
         Slot::scatter("totals", Scalar),
     ];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -82,6 +83,7 @@ impl Kernel for Axial {
     };
     const SLOTS: &'static [Slot] =
         &[Slot::read("tension", Scalar), Slot::read("beams", Scalar), Slot::scatter("totals", Scalar)];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

@@ -238,6 +238,7 @@ impl<const BENDING: bool, const MASS_ADDED: bool> Kernel for ElementLimit<BENDIN
             Slot::planes("limit", Scalar, 2),
         ],
     );
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -271,6 +272,7 @@ impl<const BENDING: bool> Kernel for WeighedLimit<BENDING> {
             Slot::row("out", Scalar, 1),
         ],
     );
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -291,6 +293,7 @@ impl<const BENDING: bool> Kernel for WeighedLimit<BENDING> {
 impl Kernel for HeldLimit {
     const SHADER: Shader = Shader { constants: CONSTANTS, ..Shader::new("dynamics/time_step", "held_limit") };
     const SLOTS: &'static [Slot] = &[Slot::read("conditions", Uint), Slot::scatter("limit", Scalar)];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

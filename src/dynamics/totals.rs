@@ -136,6 +136,7 @@ impl<const TAKEN: bool> Kernel for Sum<TAKEN> {
         if TAKEN { Slot::scatter("source", Scalar) } else { Slot::read("source", Scalar) },
         Slot::scatter("totals", Scalar),
     ];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
@@ -182,6 +183,7 @@ impl<const JACOBIAN: bool> Kernel for Worst<JACOBIAN> {
         Slot::read("lanes_used", Uint).when(JACOBIAN),
         Slot::scatter("totals", Scalar),
     ];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

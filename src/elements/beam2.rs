@@ -68,6 +68,7 @@ impl<const PERIODIC: bool, const THERMAL: bool> Kernel for Beam2<PERIODIC, THERM
         Slot::row("virial", Scalar, 9).when(PERIODIC),
         Slot::row("work", Scalar, 1).when(THERMAL),
     ];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

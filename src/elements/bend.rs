@@ -52,6 +52,7 @@ impl<const PERIODIC: bool> Kernel for Bend<PERIODIC> {
         // sum of force ⊗ D over steps, N·mm
         Slot::row("virial", Scalar, 9).when(PERIODIC),
     ];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

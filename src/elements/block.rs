@@ -11,10 +11,11 @@ use crate::kernel::lane::{Lane, Real};
 use crate::kernel::math;
 use crate::kernel::position::{self, difference};
 use crate::kernel::shader::{Shader, Share, when};
-use crate::kernel::stage::Io;
+use crate::kernel::stage::{Io, Own};
 use crate::materials::{self, Material, PARAMETERS, Tensor};
 use bytemuck::{Pod, Zeroable};
 use std::marker::PhantomData;
+use std::ops::Range;
 
 /// Corner slots per block: 8 corners × 3 components × lanes.
 pub const SLOTS: usize = 24 * LANES;
@@ -118,6 +119,30 @@ pub const fn bound_slots(weighed: bool) -> [Slot; 9] {
     joined(&READS, &[Slot::read("weights", Scalar).when(weighed), Slot::row("out", Scalar, BOUND)])
 }
 
+/// The bounds of some blocks, weighed by R/m of the nodes or not: both share their code.
+pub struct Bounding<'a, R: Real, K> {
+    pub io: &'a Io<'a, R>,
+    pub items: Range<usize>,
+    /// R/m of the nodes.
+    pub limits: Option<&'a [R]>,
+    pub out: Own<'a, R>,
+    element: PhantomData<K>,
+}
+
+impl<'a, R: Real, K> Bounding<'a, R, K> {
+    /// From the bindings of a kernel.
+    #[inline(always)]
+    pub fn new<const WEIGHED: bool>(io: &'a Io<'a, R>, items: Range<usize>) -> Self {
+        let Params { nodes, .. } = io.params();
+        let limits = if WEIGHED {
+            Some(&io.scalars(slot!(&bound_slots(WEIGHED), "weights", WEIGHED))[nodes as usize..])
+        } else {
+            None
+        };
+        Self { io, items, limits, out: io.own(slot!(&bound_slots(WEIGHED), "out")), element: PhantomData }
+    }
+}
+
 /// A block, and one register of its lanes.
 pub struct Lanes<'a, L: Lane> {
     header: Header,
@@ -214,12 +239,11 @@ impl<'a, L: Lane> Lanes<'a, L> {
         global
     }
 
-    /// Weights of the stiffness rows at the binary corners: one, or with `WEIGHED` R/m of the nodes.
+    /// Weights of the stiffness rows at the binary corners: R/m of the nodes if it is given, else one.
     #[inline(always)]
-    pub fn weights<const WEIGHED: bool>(&self, io: &Io<L::Scalar>, nodes: usize) -> [L; 8] {
+    pub fn weights(&self, limits: Option<&[L::Scalar]>) -> [L; 8] {
         let mut weights = [L::new(1.0); 8];
-        if WEIGHED {
-            let limits = &io.scalars(slot!(&bound_slots(WEIGHED), "weights", WEIGHED))[nodes..];
+        if let Some(limits) = limits {
             let mut buffer = [L::Scalar::from_f64(0.0); LANES];
             for (corner, &binary) in BINARY.iter().enumerate() {
                 let ids = &self.corners[corner * LANES + self.lane..][..L::WIDTH];
@@ -240,9 +264,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
 
     /// Writes the stiffness row sums of the binary corners of a block.
     #[inline(always)]
-    pub fn store_rows<const WEIGHED: bool>(&self, io: &Io<L::Scalar>, block: usize, rows: &[L; 8]) {
-        let mut bounds = io.own::<L::Scalar>(slot!(&bound_slots(WEIGHED), "out"));
-        let out = bounds.item(0, block);
+    pub fn store_rows(&self, out: &mut [L::Scalar], rows: &[L; 8]) {
         for (corner, &binary) in BINARY.iter().enumerate() {
             rows[binary].store(&mut out[corner * LANES + self.lane..]);
         }

@@ -6,10 +6,11 @@
 
 use super::LANES;
 use super::block::{
-    BINARY, Element, Lanes, Params, bound_slots, cross, dot, energy_slots, force_slots, shader, total, weighed_shader,
+    BINARY, Bounding, Element, Lanes, Params, bound_slots, cross, dot, energy_slots, force_slots, shader, total,
+    weighed_shader,
 };
 use crate::kernel::interface::{Constant, Slot, constants, slot};
-use crate::kernel::lane::Lane;
+use crate::kernel::lane::{Lane, Real, Work};
 use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use crate::kernel::two::Two;
@@ -432,9 +433,20 @@ impl<M: Material, const PERIODIC: bool> Kernel for Energy<M, PERIODIC> {
 impl<M: Material, const PERIODIC: bool, const WEIGHED: bool> Kernel for Bound<M, PERIODIC, WEIGHED> {
     const SHADER: Shader = weighed_shader::<Hex8, M, PERIODIC, WEIGHED>("elements/hex8", "bound");
     const SLOTS: &'static [Slot] = &bound_slots(WEIGHED);
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let bounding = Bounding::<_, Bound<M, PERIODIC, true>>::new::<WEIGHED>(io, items);
+        L::Scalar::dispatch(io.isa, bounding);
+    }
+}
+
+impl<R: Real, M: Material, const PERIODIC: bool> Work<R> for Bounding<'_, R, Bound<M, PERIODIC, true>> {
+    const WIDE: bool = true;
+    #[inline(always)]
+    fn run<L: Lane<Scalar = R>>(self) {
+        let Self { io, items, limits, mut out, .. } = self;
         let Params { nodes, left } = io.params();
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
@@ -443,14 +455,14 @@ impl<M: Material, const PERIODIC: bool, const WEIGHED: bool> Kernel for Bound<M,
                 let mut bounds = Bounds::<L, M> {
                     material: lanes.material(io),
                     rows: [L::new(0.0); 8],
-                    weights: lanes.weights::<WEIGHED>(io, nodes as usize),
+                    weights: lanes.weights(limits),
                     edges: [edges(&u[0]), edges(&u[1]), edges(&u[2])],
                     macroscopic: lanes.macroscopic::<PERIODIC>(io),
                     left,
                     law: PhantomData,
                 };
                 visit::<_, PERIODIC>(io, &lanes, nodes as usize, &mut bounds);
-                lanes.store_rows::<WEIGHED>(io, item, &bounds.rows);
+                lanes.store_rows(out.item(0, item), &bounds.rows);
             }
         }
     }

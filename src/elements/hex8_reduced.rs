@@ -16,10 +16,11 @@
 
 use super::LANES;
 use super::block::{
-    BINARY, Element, Lanes, Params, bound_slots, dot, energy_slots, force_slots, shader, total, weighed_shader,
+    BINARY, Bounding, Element, Lanes, Params, bound_slots, dot, energy_slots, force_slots, shader, total,
+    weighed_shader,
 };
 use crate::kernel::interface::{Constant, Slot, constants, slot};
-use crate::kernel::lane::Lane;
+use crate::kernel::lane::{Lane, Real, Work};
 use crate::kernel::shader::Shader;
 use crate::kernel::stage::{Io, Kernel};
 use crate::materials::{Material, Tensor, jacobian};
@@ -257,9 +258,20 @@ fn add_rows<L: Lane>(rows: &mut [L; 8], k_total: L, sizes: &[L; 8]) {
 impl<M: Material, const PERIODIC: bool, const WEIGHED: bool> Kernel for Bound<M, PERIODIC, WEIGHED> {
     const SHADER: Shader = weighed_shader::<Hex8Reduced, M, PERIODIC, WEIGHED>("elements/hex8_reduced", "bound");
     const SLOTS: &'static [Slot] = &bound_slots(WEIGHED);
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let bounding = Bounding::<_, Bound<M, PERIODIC, true>>::new::<WEIGHED>(io, items);
+        L::Scalar::dispatch(io.isa, bounding);
+    }
+}
+
+impl<R: Real, M: Material, const PERIODIC: bool> Work<R> for Bounding<'_, R, Bound<M, PERIODIC, true>> {
+    const WIDE: bool = true;
+    #[inline(always)]
+    fn run<L: Lane<Scalar = R>>(self) {
+        let Self { io, items, limits, mut out, .. } = self;
         let Params { nodes, left } = io.params();
         for item in items {
             for lane in (0..LANES).step_by(L::WIDTH) {
@@ -277,7 +289,7 @@ impl<M: Material, const PERIODIC: bool, const WEIGHED: bool> Kernel for Bound<M,
                     }
                     across[corner] = b[2].fma(b[2], b[1] * b[1]).sqrt();
                 }
-                let weights = lanes.weights::<WEIGHED>(io, nodes as usize);
+                let weights = lanes.weights(limits);
                 let sums = [total(&slopes[0], &weights), total(&slopes[1], &weights), total(&slopes[2], &weights)];
                 let sum_across = total(&across, &weights);
                 let volume = lanes.shape(VOLUME);
@@ -316,7 +328,7 @@ impl<M: Material, const PERIODIC: bool, const WEIGHED: bool> Kernel for Bound<M,
                     }
                     add_rows(&mut rows, lanes.shape(STIFFNESS + mode) * total(&sizes, &weights), &sizes);
                 }
-                lanes.store_rows::<WEIGHED>(io, item, &rows);
+                lanes.store_rows(out.item(0, item), &rows);
             }
         }
     }

@@ -32,6 +32,7 @@ impl Kernel for Exact {
         // sum of all quanta, wrapping
         Slot::atomic("sum", Int),
     ];
+    const WIDE: bool = false;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {

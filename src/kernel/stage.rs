@@ -192,6 +192,10 @@ impl Plan {
 }
 
 /// A kernel, written once for every precision and register width.
+///
+/// The code of an instruction set is what the compiler inlines into `run`. Closures given to adapters of the standard library
+/// (`map` of arrays, `from_fn`, `then`, `zip`) often stay functions of their own, without the instruction set, where every register
+/// operation is a call: kernels use loops over indices, and functions that are always inlined.
 pub trait Kernel: 'static {
     /// Its WGSL twin.
     const SHADER: Shader;
