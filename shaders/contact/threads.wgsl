@@ -213,7 +213,7 @@ fn touches_pair(beam: u32, own: Piece, slot: u32) -> bool {
     let s = SLOT_STATE * slot;
     if !(push.weight > 0.0) {
         release(beam, s);
-        states[s] = min(depth, 0.0);
+        states[s] = min(depth + GAP_ROUNDING, 0.0);
         return false;
     }
     add_sum(beam, SUM_ENERGY, push.energy);

@@ -25,7 +25,7 @@ use crate::kernel::vector::{Vector, add, fma, scale, select};
 
 /// Upper bound of the rounding error of a gap, mm: a face that touches by less must not be missed, whenever its gap was last
 /// evaluated.
-const GAP_ROUNDING: f64 = 1e-6;
+pub const GAP_ROUNDING: f64 = 1e-6;
 /// Two distances count as equal if they differ by at most this share.
 const TIE: f64 = 1e-4;
 /// Constants shared with the twin.

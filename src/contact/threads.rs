@@ -7,6 +7,7 @@
 use super::arc_offset::{self, Piece};
 use super::friction::slide;
 use super::pairs::{READS, Scene};
+use super::potential::GAP_ROUNDING;
 use super::segments::{self, Push, Segments};
 use super::sums::{self, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
 use super::{EMPTY, Params, add_force, is_in_range, of_key, slot_state, status};
@@ -241,7 +242,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
         };
         if !(push.weight > zero) {
             self.release(beam, state, sum);
-            state[0] = depth.min(zero);
+            state[0] = (depth + R::from_f64(GAP_ROUNDING)).min(zero);
             return zero;
         }
         sum[SUM_ENERGY] = sum[SUM_ENERGY] + push.energy;
@@ -384,7 +385,7 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
             &arc_offset::CONSTANTS,
             &segments::CONSTANTS,
             &sums::shared(FRICTION, PERIODIC),
-            &constants![uint: SLOT_STATE = slot_state(FRICTION); scalar: LEAST],
+            &constants![uint: SLOT_STATE = slot_state(FRICTION); scalar: LEAST, GAP_ROUNDING],
         ],
         ..Shader::new("contact/threads", "force")
     };

@@ -99,3 +99,57 @@ impl<L: Lane> Lane for Two<L> {
         Self(self.0.round(), self.1.round())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::lane::{Isa, Real, Work};
+    use crate::kernel::math;
+
+    /// Compares pairs of registers with registers of an instruction set, and masks with the numbers that they compare.
+    struct Check;
+
+    fn values<L: Lane>(x: L) -> Vec<L::Scalar> {
+        let mut values = vec![L::Scalar::default(); L::WIDTH];
+        x.store(&mut values);
+        values
+    }
+
+    impl<R: Real> Work<R> for Check {
+        const WIDE: bool = true;
+        fn run<L: Lane<Scalar = R>>(self) {
+            let numbers: Vec<R> = (0..2 * L::WIDTH).map(|i| R::from_f64(0.003 + 0.17 * i as f64)).collect();
+            let (first, second) = (L::load(&numbers), L::load(&numbers[L::WIDTH..]));
+            let two = Two::<L>::load(&numbers);
+            let functions: [(fn(L) -> L, fn(Two<L>) -> Two<L>); 4] = [
+                (math::log1p, math::log1p),
+                (math::exp, math::exp),
+                (math::asinh_ratio, math::asinh_ratio),
+                (
+                    |x| (x * x - L::new(0.5)).sqrt().abs().min(x) / x,
+                    |x| (x * x - Two::new(0.5)).sqrt().abs().min(x) / x,
+                ),
+            ];
+            for (of_one, of_two) in functions {
+                let both: Vec<R> = [values(of_one(first)), values(of_one(second))].concat();
+                let bits = |all: &[R]| all.iter().map(|x| x.to_f64().to_bits()).collect::<Vec<_>>();
+                assert_eq!(bits(&values(of_two(two))), bits(&both));
+            }
+            for limit in 0..=2 * L::WIDTH {
+                let below = Two::splat(R::from_f64(0.17 * limit as f64));
+                let mask = two.lt(below);
+                assert_eq!((Two::<L>::any(mask), Two::<L>::all(mask)), (limit > 0, limit == 2 * L::WIDTH));
+                let mask = first.lt(below.0);
+                assert_eq!((L::any(mask), L::all(mask)), (limit > 0, limit >= L::WIDTH));
+            }
+        }
+    }
+
+    #[test]
+    fn pairs_give_the_bits_of_their_registers_and_masks_tell_any_and_all() {
+        for isa in Isa::available() {
+            f32::dispatch(isa, Check);
+            f64::dispatch(isa, Check);
+        }
+    }
+}

@@ -84,8 +84,7 @@ impl Simulation {
         for (old, description) in self.model.plan.buffers.iter().enumerate() {
             let new = model.plan.buffers.iter().position(|d| d.name == description.name);
             let is_listed = b.found.contains(&Some(Buffer(old))) || lists.contains(&Some(Buffer(old)));
-            let Some(new) =
-                new.filter(|_| !is_listed && !matches!(description.name, "items of cells" | "cells" | "status"))
+            let Some(new) = new.filter(|_| !is_listed && !matches!(description.name, "items of cells" | "cells"))
             else {
                 continue;
             };

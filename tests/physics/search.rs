@@ -2,7 +2,9 @@
 
 use super::brute_force::push;
 use super::contact::{field, scene};
-use crate::common::{Random, advance, below, block, cross, loaded, near, neo_hookean, norm, shaped, start, with};
+use crate::common::{
+    Random, advance, below, block, coarse_cell, cross, loaded, near, neo_hookean, norm, shaped, start, with,
+};
 use serde_json::{Value, json};
 use tricot::contact::found;
 use tricot::mesh::surface::Surface;
@@ -160,5 +162,23 @@ fn contact_is_searched_again_only_where_bodies_move_relative_to_each_other() {
         assert!(force(&simulation).iter().all(|force| *force == 0.0));
         advance(&mut simulation, 1e-3);
         force(&simulation).iter().for_each(|force| near("force on a thread, N", *force, 2.0 * expected, allowed));
+    }
+}
+
+/// Gaps only decide when a face is looked at: lists of any reach, searched at other times, and tables that grow on the way give
+/// the same motion, bit by bit.
+#[test]
+fn the_contact_skin_changes_no_motion() {
+    let run = |skin: f64| {
+        let case = with(coarse_cell(), &[("/effects/contact", json!({ "skin_mm": skin }))]);
+        let mut cell = start(&case, F32);
+        advance(&mut cell, 2.5e-4);
+        (cell.searches(), cell.fluctuations())
+    };
+    let (searches, motion) = run(0.12);
+    for skin in [0.07, 0.25] {
+        let (others, same) = run(skin);
+        assert!(others != searches, "both searched {searches} times");
+        assert!(motion == same, "with a skin of {skin} mm");
     }
 }
