@@ -294,7 +294,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
                         let Glance { entry, place, .. } = glances[number];
                         if seen.is_close(number) && (kept.gaps[GAPS + place] < zero || entry == pushed.nearest.entry) {
                             let forces = (&*pushed, &rubbed);
-                            self.press(view, (number, entry), seen, forces, corners, &mut own, kept.sums);
+                            self.press(view, (number, entry, seen), forces, corners, &mut own, kept.sums);
                         }
                     }
                 }
@@ -354,8 +354,8 @@ fn run<R: Real, const N: usize, const FRICTION: bool, const PERIODIC: bool>(
         sums: io.own(slot!(&SLOTS, "sums")),
     };
     let mut space = scratch::take::<Space<R, N>>();
+    points_in_reach(io, &step, items, &mut memory, &mut space);
     let Space { walks, points, views, bodies, first, second, at_hand, farther } = &mut *space;
-    points_in_reach(io, &step, items, &mut memory, (walks, points, views));
     let surface = &step.surface;
     if N > 1 {
         R::dispatch(io.isa, Place { surface, points, views });
@@ -433,8 +433,9 @@ fn points_in_reach<R: Real, const N: usize, const FRICTION: bool, const PERIODIC
     step: &Step<R, FRICTION, PERIODIC>,
     items: Range<usize>,
     memory: &mut Memory<R>,
-    (walks, points, views): (&mut Vec<Walk<R, N>>, &mut Vec<([u32; N], [R; N])>, &mut Vec<View<R>>),
+    space: &mut Space<R, N>,
 ) {
+    let Space { walks, points, views, .. } = space;
     walks.clear();
     points.clear();
     views.clear();

@@ -109,6 +109,9 @@ mod tests {
     /// Compares pairs of registers with registers of an instruction set, and masks with the numbers that they compare.
     struct Check;
 
+    /// A function of a register, and of a pair.
+    type Same<L> = (fn(L) -> L, fn(Two<L>) -> Two<L>);
+
     fn values<L: Lane>(x: L) -> Vec<L::Scalar> {
         let mut values = vec![L::Scalar::default(); L::WIDTH];
         x.store(&mut values);
@@ -121,7 +124,7 @@ mod tests {
             let numbers: Vec<R> = (0..2 * L::WIDTH).map(|i| R::from_f64(0.003 + 0.17 * i as f64)).collect();
             let (first, second) = (L::load(&numbers), L::load(&numbers[L::WIDTH..]));
             let two = Two::<L>::load(&numbers);
-            let functions: [(fn(L) -> L, fn(Two<L>) -> Two<L>); 4] = [
+            let functions: [Same<L>; 4] = [
                 (math::log1p, math::log1p),
                 (math::exp, math::exp),
                 (math::asinh_ratio, math::asinh_ratio),
