@@ -62,7 +62,6 @@ struct Closest {
     away: vec3<f32>,
     distance: f32,
     height: f32,
-    interior: bool,
 }
 
 // The point of an edge closest to the origin, or a corner.
@@ -106,7 +105,7 @@ fn closest(q: array<vec3<f32>, 4>, p: Patch) -> Closest {
         let c = 1.0 - on.y;
         let d = 1.0 + on.y;
         let weights = vec4<f32>(0.25 * a * c, 0.25 * b * c, 0.25 * b * d, 0.25 * a * d);
-        return Closest(weights, select(normal, normal * -1.0, height < 0.0), abs(height), height, true);
+        return Closest(weights, select(normal, normal * -1.0, height < 0.0), abs(height), height);
     }
     var best = on_edge(q, 0u);
     for (var a = 1u; a < 4u; a++) {
@@ -121,5 +120,5 @@ fn closest(q: array<vec3<f32>, 4>, p: Patch) -> Closest {
     let n = cross(p.twist * eta + p.along, p.twist * xi + p.across);
     let distance = sqrt(best.square);
     let away = best.offset * (1.0 / max(distance, 1e-12));
-    return Closest(w, away, distance, dot(best.offset, n) / max(norm(n), 1e-20), false);
+    return Closest(w, away, distance, dot(best.offset, n) / max(norm(n), 1e-20));
 }

@@ -9,7 +9,7 @@
 //! body. Carriers keep their lists if nothing near them has moved relative to them (see [`super::skin`]).
 
 use super::grid::{
-    BOX, FACE_BOXES, Motion, Moved, ROUNDING, SLAB, SLAB_FACES, absolute, cell_index, cells, has_moved, inverse,
+    BOX, Cells, FACE_BOXES, Filled, Motion, Moved, ROUNDING, SLAB, SLAB_FACES, absolute, cells_of, has_moved, inverse,
     pull_back, stretch,
 };
 use super::surface::{self, CARRIED, FACE, POINT, Surface, entry, of_coded};
@@ -231,10 +231,8 @@ impl<const THREAD: bool, const PERIODIC: bool> Kernel for Candidates<THREAD, PER
 /// What the carriers of a chunk read.
 struct Search<'a, R, const PERIODIC: bool> {
     surface: Surface<'a, R, PERIODIC>,
-    params: Params,
     slabs: &'a [u32],
-    counts: &'a [u32],
-    lists: &'a [u32],
+    grid: Filled<'a>,
     boxes: &'a [R],
     face_boxes: &'a [R],
     stretch: [R; 2],
@@ -250,39 +248,18 @@ struct Carrier<R> {
     own: u32,
 }
 
-/// Cells from the first to the last along x and y.
-type Cells = [(i32, i32); 2];
-
 impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
-    /// The cells of a carrier.
-    #[inline(always)]
-    fn cells(&self, place: &Place<R>) -> Cells {
-        let mut ranges = [(0, 0); 2];
-        for k in 0..2 {
-            let (low, high) = (place.middle[k] - place.half[k], place.middle[k] + place.half[k]);
-            ranges[k] = cells::<_, PERIODIC>(&self.params, k, low, high);
-        }
-        ranges
-    }
-
     /// Whether a cell is full.
     #[inline(always)]
     fn overflows(&self, [xs, ys]: Cells) -> bool {
         for y in ys.0..=ys.1 {
             for x in xs.0..=xs.1 {
-                if self.counts[cell_index(&self.params, x, y)] > self.params.capacity {
+                if self.grid.items(x, y).is_none() {
                     return true;
                 }
             }
         }
         false
-    }
-
-    /// The items of a cell.
-    #[inline(always)]
-    fn items(&self, x: i32, y: i32) -> &[u32] {
-        let cell = cell_index(&self.params, x, y);
-        &self.lists[cell * self.params.capacity as usize..][..self.counts[cell] as usize]
     }
 
     /// The image of a slab of another body within reach of a carrier.
@@ -297,12 +274,12 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
     /// Whether a slab within reach has moved relative to a carrier whose nodes have moved from `least` to `greatest`.
     #[inline(always)]
     fn has_moved(&self, carrier: &Carrier<R>, [xs, ys]: Cells, (least, greatest): ([R; 3], [R; 3])) -> bool {
-        let apart = R::from_i32(self.params.apart as i32);
+        let apart = R::from_i32(self.grid.params.apart as i32);
         for y in ys.0..=ys.1 {
             for x in xs.0..=xs.1 {
-                for &item in self.items(x, y) {
+                for &item in self.grid.items(x, y).unwrap_or_default() {
                     let slab = item as usize;
-                    if item < self.params.slabs
+                    if item < self.grid.params.slabs
                         && has_moved(&self.boxes[BOX * slab..][..BOX], least, greatest, apart)
                         && self.image_of(carrier, slab).is_some()
                     {
@@ -352,10 +329,8 @@ fn run<K: Kernel, R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, ite
             gradient: &io.row.gradient,
             period: params.period,
         },
-        params,
         slabs: io.uints(slot!(&SLOTS, "slabs")),
-        counts: io.uints(slot!(&SLOTS, "counts")),
-        lists: io.uints(slot!(&SLOTS, "lists")),
+        grid: Filled { params, counts: io.uints(slot!(&SLOTS, "counts")), lists: io.uints(slot!(&SLOTS, "lists")) },
         boxes: io.scalars(slot!(&SLOTS, "boxes")),
         face_boxes: io.scalars(slot!(&SLOTS, "face_boxes")),
         stretch: stretch(&inverse),
@@ -381,7 +356,9 @@ fn run<K: Kernel, R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, ite
             continue;
         }
         let carrier = Carrier { place, base, reach, own };
-        let cells = search.cells(&carrier.place);
+        let (middle, half) = (carrier.place.middle, carrier.place.half);
+        let (low, high) = ([middle[0] - half[0], middle[1] - half[1]], [middle[0] + half[0], middle[1] + half[1]]);
+        let cells = cells_of::<_, PERIODIC>(&params, low, high);
         // an overflow triggers a new search with larger tables
         if search.overflows(cells) {
             continue;
@@ -396,7 +373,7 @@ fn run<K: Kernel, R: Real, const N: usize, const PERIODIC: bool>(io: &Io<R>, ite
         for y in ys.0..=ys.1 {
             for x in xs.0..=xs.1 {
                 // a slab may be in several cells
-                for &near in search.items(x, y) {
+                for &near in search.grid.items(x, y).unwrap_or_default() {
                     if near < params.slabs {
                         search.add(&carrier, near as usize, &mut list);
                     }

@@ -125,7 +125,7 @@ pub fn absolute<K: Kernel, R: Real>(io: &Io<R>, inverse: &[[R; 2]; 2], node: usi
 
 /// First and last cell along one axis for an interval of the pulled-back plane; the last may exceed the first by whole periods.
 #[inline(always)]
-pub fn cells<R: Real, const PERIODIC: bool>(params: &Params, axis: usize, low: R, high: R) -> (i32, i32) {
+fn cells<R: Real, const PERIODIC: bool>(params: &Params, axis: usize, low: R, high: R) -> (i32, i32) {
     let (low, high, count) = (cell(params, axis, low), cell(params, axis, high), params.cells[axis] as i32);
     if PERIODIC && params.period[axis] != 0 {
         (low, high.min(low + count - 1))
@@ -145,9 +145,38 @@ fn cell<R: Real>(params: &Params, axis: usize, x: R) -> i32 {
 
 /// Index of a cell.
 #[inline(always)]
-pub fn cell_index(params: &Params, x: i32, y: i32) -> usize {
+fn cell_index(params: &Params, x: i32, y: i32) -> usize {
     let (nx, ny) = (params.cells[0] as i32, params.cells[1] as i32);
     (y.rem_euclid(ny) * nx + x.rem_euclid(nx)) as usize
+}
+
+/// Cells from the first to the last along x and y.
+pub type Cells = [(i32, i32); 2];
+
+/// The cells of a box of the pulled-back plane.
+#[inline(always)]
+pub fn cells_of<R: Real, const PERIODIC: bool>(params: &Params, low: [R; 2], high: [R; 2]) -> Cells {
+    [cells::<_, PERIODIC>(params, 0, low[0], high[0]), cells::<_, PERIODIC>(params, 1, low[1], high[1])]
+}
+
+/// The filled grid.
+pub struct Filled<'a> {
+    pub params: Params,
+    pub counts: &'a [u32],
+    pub lists: &'a [u32],
+}
+
+impl<'a> Filled<'a> {
+    /// The items of a cell; `None` if there were more than it holds.
+    #[inline(always)]
+    pub fn items(&self, x: i32, y: i32) -> Option<&'a [u32]> {
+        let cell = cell_index(&self.params, x, y);
+        let (count, capacity) = (self.counts[cell], self.params.capacity);
+        if count > capacity {
+            return None;
+        }
+        Some(&self.lists[cell * capacity as usize..][..count as usize])
+    }
 }
 
 /// Displacements of nodes, and those at the last full search.

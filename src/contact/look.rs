@@ -4,8 +4,10 @@
 use super::face::{Closest, Patch, closest};
 use super::potential::Push;
 use super::surface::{FACE, Surface, of_coded};
-use super::table::{LANES, Table};
+use super::table::Table;
 use super::{EMPTY, of_key, shift};
+use crate::elements::LANES;
+use crate::elements::block::splat_tensor;
 use crate::kernel::lane::{Lane, Real, Work};
 use crate::kernel::position::QUANTUM;
 use crate::kernel::vector::{Vector, add, apply, fma, sub};
@@ -191,13 +193,7 @@ impl<R: Real> Places<R> {
         if !PERIODIC {
             return (rest, add(rest, moved));
         }
-        let mut splat = [[L::new(0.0); 3]; 3];
-        for i in 0..3 {
-            for j in 0..3 {
-                splat[i][j] = L::splat(gradient[i][j]);
-            }
-        }
-        (rest, add(add(rest, apply(&splat, rest)), moved))
+        (rest, add(add(rest, apply(&splat_tensor(gradient), rest)), moved))
     }
 }
 

@@ -7,7 +7,7 @@
 //! lists the faces near each beam and each yarn node. Narrow phase: every step `penalty` applies the forces of the listed
 //! faces, the gradient of a `potential`, to the contact points, which `arc` places along beams. Points `look` at faces in
 //! registers, a face in each lane, with their results in a `table`; `rub` adds damping and friction, and `press` adds the forces
-//! to nodes. For beams on beams, `pairs` finds nearby beams, and `threads` applies the forces: `arc_offset` constructs the lines
+//! to nodes, in sums of a `joint`. For beams on beams, `pairs` finds nearby beams, and `threads` applies the forces: `arc_offset` constructs the lines
 //! of threads, and `segments` integrates along them. Forces and contact stiffness are summed as integers, so the sum is
 //! independent of the order, and the forces of a pair cancel exactly.
 
@@ -17,6 +17,7 @@ pub mod candidates;
 pub mod face;
 pub mod friction;
 pub mod grid;
+mod joint;
 pub mod look;
 pub mod memory;
 pub mod pairs;

@@ -8,7 +8,7 @@
 //! one thread whose nearer ends are closer than this along the thread form no pair.
 
 use super::arc_offset::{self, OffsetLines, Piece};
-use super::grid::{self, BOX, MOTION, absolute, cell_index, cells, has_moved, inverse, pull_back};
+use super::grid::{self, BOX, Cells, Filled, MOTION, absolute, cells_of, has_moved, inverse, pull_back};
 use super::segments::{self, Segments};
 use super::{EMPTY, Params, found, key, of_key, shift, status};
 use crate::elements::beam2;
@@ -116,16 +116,11 @@ fn between<R: Real>(own: [Vector<R>; 2], apart: Vector<R>, other: [Vector<R>; 2]
 /// The search data for the neighbours of a beam.
 struct Search<'a, R, const PERIODIC: bool> {
     scene: Scene<'a, R, PERIODIC>,
-    params: Params,
-    counts: &'a [u32],
-    lists: &'a [u32],
+    grid: Filled<'a>,
     boxes: &'a [R],
     inverse: [[R; 2]; 2],
     reach: R,
 }
-
-/// Cells from the first to the last along x and y.
-type Cells = [(i32, i32); 2];
 
 impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
     /// The cells of a beam's piece; `None` if its position is not finite.
@@ -136,38 +131,24 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
             return None;
         }
         let (first, second) = (pull_back(&self.inverse, piece.now[0]), pull_back(&self.inverse, piece.now[1]));
-        let mut ranges = [(0, 0); 2];
-        for k in 0..2 {
-            let (a, b) = (node[k] + first[k], node[k] + second[k]);
-            ranges[k] = cells::<_, PERIODIC>(&self.params, k, a.min(b), a.max(b));
-        }
-        Some(ranges)
-    }
-
-    /// The items of a cell; if it is full, the count exceeds its capacity.
-    #[inline(always)]
-    fn items(&self, x: i32, y: i32) -> Option<&[u32]> {
-        let cell = cell_index(&self.params, x, y);
-        let (count, capacity) = (self.counts[cell], self.params.capacity);
-        if count > capacity {
-            return None;
-        }
-        Some(&self.lists[cell * capacity as usize..][..count as usize])
+        let (a, b) = ([node[0] + first[0], node[1] + first[1]], [node[0] + second[0], node[1] + second[1]]);
+        let (low, high) = ([a[0].min(b[0]), a[1].min(b[1])], [a[0].max(b[0]), a[1].max(b[1])]);
+        Some(cells_of::<_, PERIODIC>(&self.grid.params, low, high))
     }
 
     /// Whether a beam of a higher number in these cells has moved relative to this one since the last full search; `None` if a
     /// cell is full.
     #[inline(always)]
     fn has_moved(&self, beam: usize, [xs, ys]: Cells) -> Option<bool> {
-        let item = self.params.slabs + beam as u32;
+        let item = self.grid.params.slabs + beam as u32;
         let own = &self.boxes[BOX * item as usize..][..BOX];
         let least = [own[MOTION], own[MOTION + 1], own[MOTION + 2]];
         let greatest = [own[MOTION + 3], own[MOTION + 4], own[MOTION + 5]];
-        let apart = R::from_i32(self.params.apart as i32);
+        let apart = R::from_i32(self.grid.params.apart as i32);
         let mut moved = false;
         for y in ys.0..=ys.1 {
             for x in xs.0..=xs.1 {
-                for &near in self.items(x, y)? {
+                for &near in self.grid.items(x, y)? {
                     if moved {
                         break;
                     }
@@ -182,12 +163,12 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
     /// The image of an item nearest to a beam.
     #[inline(always)]
     fn image(&self, beam: usize, near: usize) -> [i32; 2] {
-        let item = self.params.slabs as usize + beam;
+        let item = self.grid.params.slabs as usize + beam;
         let mut image = [0; 2];
         for k in 0..2 {
-            if PERIODIC && self.params.period[k] != 0 {
+            if PERIODIC && self.grid.params.period[k] != 0 {
                 let apart = self.boxes[BOX * item + k] - self.boxes[BOX * near + k];
-                image[k] = (apart / (R::from_i32(self.params.period[k]) * R::from_f64(QUANTUM))).to_i32();
+                image[k] = (apart / (R::from_i32(self.grid.params.period[k]) * R::from_f64(QUANTUM))).to_i32();
             }
         }
         image
@@ -203,7 +184,7 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
     /// Removes pairs out of reach from a beam's list; returns the number left.
     #[inline(always)]
     fn keep(&self, beam: usize, piece: &Piece<R>, keys: &mut [u32], states: &mut [R]) -> usize {
-        let size = self.params.state as usize;
+        let size = self.grid.params.state as usize;
         let mut count = 0;
         for slot in 0..keys.len() {
             let known = std::mem::replace(&mut keys[slot], EMPTY);
@@ -232,14 +213,14 @@ impl<R: Real, const PERIODIC: bool> Search<'_, R, PERIODIC> {
         states: &mut [R],
         mut count: usize,
     ) -> bool {
-        let size = self.params.state as usize;
+        let size = self.grid.params.state as usize;
         for y in ys.0..=ys.1 {
             for x in xs.0..=xs.1 {
-                for &near in self.items(x, y).unwrap_or_default() {
-                    if near <= self.params.slabs + beam as u32 {
+                for &near in self.grid.items(x, y).unwrap_or_default() {
+                    if near <= self.grid.params.slabs + beam as u32 {
                         continue;
                     }
-                    let other = (near - self.params.slabs) as usize;
+                    let other = (near - self.grid.params.slabs) as usize;
                     let image = self.image(beam, near as usize);
                     let key = key(other, image);
                     let mut place = 0;
@@ -290,9 +271,7 @@ impl<const PERIODIC: bool> Kernel for Pairs<PERIODIC> {
         let params: Params = io.params();
         let search = Search::<_, PERIODIC> {
             scene: Scene::new(io, &params),
-            params,
-            counts: io.uints(slot!(&PAIRS, "counts")),
-            lists: io.uints(slot!(&PAIRS, "lists")),
+            grid: Filled { params, counts: io.uints(slot!(&PAIRS, "counts")), lists: io.uints(slot!(&PAIRS, "lists")) },
             boxes: io.scalars(slot!(&PAIRS, "boxes")),
             inverse: inverse::<_, PERIODIC>(&io.row.gradient),
             reach: L::Scalar::from_f64(f64::from(2.0 * params.thread_radius + params.skin)),

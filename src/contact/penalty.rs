@@ -9,10 +9,10 @@
 //! be inside, at all faces that could be nearer.
 
 use super::candidates::MADE;
+use super::joint::Joint;
 use super::look::{Glance, Look, Place, Seen, View};
 use super::memory::{CLOSED, DAMPED, ELASTIC, GAPS, INNER, Kept, LEAST, Memory, NORMAL, touch};
 use super::potential::{self, Nearest, Pushed, margin};
-use super::press::Joint;
 use super::sums::SUM_ENERGY;
 use super::surface::{self, CARRIED, FACE, POINT, Surface, of_coded};
 use super::{EMPTY, Params, candidates, of_key, status, sums};
@@ -292,7 +292,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
                     let (glances, seen) = looks[look];
                     for number in body.glances[look].clone() {
                         let Glance { entry, place, .. } = glances[number];
-                        if seen.is_close(number) && (kept.gaps[GAPS + place] < zero || entry == pushed.nearest.entry) {
+                        if kept.gaps[GAPS + place] < zero || entry == pushed.nearest.entry {
                             let forces = (&*pushed, &rubbed);
                             self.press(view, (number, entry, seen), forces, corners, &mut own, kept.sums);
                         }
@@ -396,7 +396,7 @@ fn run<R: Real, const N: usize, const FRICTION: bool, const PERIODIC: bool>(
             }
         }
     }
-    let (mut corners, mut carriers, mut touching) = (Joint::new(), Joint::new(), 0);
+    let (mut corners, mut carriers, mut touching) = (Joint::new([0; 4]), Joint::new([0; N]), 0);
     for (walk, view) in walks.iter().zip(&*views) {
         let looks = [(&first[..], &*at_hand), (&second[..], &*farther)];
         let kept = &mut memory.of(walk.item);

@@ -17,8 +17,8 @@
 
 use super::face::{Closest, OnEdge, on_corner, on_edge};
 use super::look::{Face, View};
-use super::table::LANES;
 use super::{EMPTY, Params};
+use crate::elements::LANES;
 use crate::kernel::interface::{Constant, constants};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::vector::{Vector, add, fma, scale, select};

@@ -1,6 +1,7 @@
 //! Forces of faces on points as integers: the forces on the corners of a face and on the nodes that carry a point cancel exactly.
 
 use super::is_in_range;
+use super::joint::Joint;
 use super::look::{Seen, View};
 use super::penalty::{Step, Walk};
 use super::potential::{Pushed, out};
@@ -8,64 +9,6 @@ use super::rub::Rubbed;
 use super::sums::{add_virial, virial};
 use crate::kernel::lane::Real;
 use crate::kernel::vector::{Vector, add, fma, scale};
-use std::sync::atomic::{AtomicI32, Ordering};
-
-/// Forces and stiffness for the corners of a face or the nodes that carry a point, in quanta. Consecutive points often share
-/// these nodes; their sums are added to the nodes together.
-pub(super) struct Joint<const N: usize> {
-    nodes: [usize; N],
-    forces: [[i32; 3]; N],
-    stiffness: [i32; N],
-}
-
-impl<const N: usize> Joint<N> {
-    pub fn new() -> Self {
-        Self { nodes: [0; N], forces: [[0; 3]; N], stiffness: [0; N] }
-    }
-
-    /// Adds the sums to their nodes.
-    #[inline(always)]
-    pub fn finish(&mut self, forces: &[AtomicI32], stiffness: &[AtomicI32]) {
-        let plane = forces.len() / 3;
-        for a in 0..N {
-            for k in 0..3 {
-                if self.forces[a][k] != 0 {
-                    forces[self.nodes[a] + k * plane].fetch_add(self.forces[a][k], Ordering::Relaxed);
-                }
-            }
-            if self.stiffness[a] != 0 {
-                stiffness[self.nodes[a]].fetch_add(self.stiffness[a], Ordering::Relaxed);
-            }
-        }
-        *self = Self { nodes: self.nodes, ..Self::new() };
-    }
-
-    /// The sums of some nodes; those of other nodes are finished first.
-    #[inline(always)]
-    fn of(&mut self, nodes: [usize; N], forces: &[AtomicI32], stiffness: &[AtomicI32]) -> &mut Self {
-        if nodes != self.nodes {
-            self.finish(forces, stiffness);
-            self.nodes = nodes;
-        }
-        self
-    }
-
-    /// Adds stiffness by weights, in quanta.
-    #[inline(always)]
-    fn stiffen<R: Real>(&mut self, quanta: R, weights: &[R; N]) {
-        for a in 0..N {
-            self.stiffness[a] = self.stiffness[a].wrapping_add((quanta * weights[a].abs()).to_i32());
-        }
-    }
-
-    /// Adds a force to a node, in quanta.
-    #[inline(always)]
-    fn push(&mut self, node: usize, force: [i32; 3]) {
-        for k in 0..3 {
-            self.forces[node][k] = self.forces[node][k].wrapping_add(force[k]);
-        }
-    }
-}
 
 /// A vector in quanta.
 #[inline(always)]

@@ -4,11 +4,11 @@
 
 use super::candidates::MADE;
 use super::friction::slide;
+use super::joint::Joint;
 use super::look::View;
 use super::memory::{DAMPED, ELASTIC, Kept, NORMAL, touch};
 use super::penalty::{Step, Walk};
 use super::potential::Pushed;
-use super::press::Joint;
 use super::sums::{SUM_DAMPING, SUM_FRICTION, SUM_RADIUS, SUM_SLIP};
 use super::{EMPTY, Params, status};
 use crate::kernel::lane::Real;

@@ -1,11 +1,9 @@
 //! A table with a row per quantity and a column per item, so that registers hold consecutive items.
 
+use crate::elements::LANES;
 use crate::kernel::lane::{Lane, Real};
 
-/// Most lanes of a register; rows are whole registers.
-pub const LANES: usize = 16;
-
-/// The table.
+/// The table. Rows are whole registers of the widest kind.
 #[derive(Default)]
 pub struct Table<R> {
     values: Vec<R>,
@@ -37,12 +35,7 @@ impl<R: Real> Table<R> {
         values
     }
 
-    /// The register of items that starts at `first`.
-    #[inline(always)]
-    pub fn load<L: Lane<Scalar = R>>(&self, row: usize, first: usize) -> L {
-        L::load(&self.values[row * self.row + first..])
-    }
-
+    /// Writes the register of items that starts at `first`.
     #[inline(always)]
     pub fn store<L: Lane<Scalar = R>>(&mut self, row: usize, first: usize, value: L) {
         value.store(&mut self.values[row * self.row + first..]);

@@ -6,11 +6,12 @@
 
 use super::arc_offset::{self, Piece};
 use super::friction::slide;
+use super::joint::Joint;
 use super::pairs::{READS, Scene};
 use super::potential::GAP_ROUNDING;
 use super::segments::{self, Push, Segments};
 use super::sums::{self, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP, add_virial, virial};
-use super::{EMPTY, Params, add_force, is_in_range, of_key, slot_state, status};
+use super::{EMPTY, Params, is_in_range, of_key, slot_state, status};
 use crate::elements::beam2::{self, TABLE};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Slot, constants, joined, slot};
@@ -71,7 +72,7 @@ impl<R: Real> Pair<R> {
 
     /// Adds forces on the ends of both pieces to their nodes, as integers whose sum is zero; `inverse` is one over the quantum.
     #[inline(always)]
-    fn add_forces(&self, loads: &mut [Load; 2], status: &[AtomicU32], inverse: R, push: &Push<R>) {
+    fn add_forces(&self, loads: &mut [Joint<4>; 2], status: &[AtomicU32], inverse: R, push: &Push<R>) {
         let mut rest = [0i32; 3];
         for i in 0..2 {
             let ends = if i == 0 { push.own } else { push.others };
@@ -90,39 +91,21 @@ impl<R: Real> Pair<R> {
                 }
                 for k in 0..3 {
                     rest[k] -= whole[k];
-                    loads[i].forces[n][k] = loads[i].forces[n][k].wrapping_add(whole[k]);
                 }
+                loads[i].push(n, whole);
             }
         }
     }
 
     /// Adds bounds of the stiffness at the ends of both pieces, times the sum of the weights of both; `inverse` as above.
     #[inline(always)]
-    fn add_rows(&self, loads: &mut [Load; 2], inverse: R, push: &Push<R>, most_weights: R) {
+    fn add_rows(&self, loads: &mut [Joint<4>; 2], inverse: R, push: &Push<R>, most_weights: R) {
         for i in 0..2 {
             let rows = if i == 0 { push.own_rows } else { push.other_rows };
             for end in 0..2 {
-                let quanta = rows[end] * most_weights * inverse;
-                for n in 0..4 {
-                    let whole = (quanta * self.weights[i][end][n].abs()).to_i32();
-                    loads[i].rows[n] = loads[i].rows[n].wrapping_add(whole);
-                }
+                loads[i].stiffen(rows[end] * most_weights * inverse, &self.weights[i][end]);
             }
         }
-    }
-}
-
-/// Forces and stiffness of the four nodes of a piece, quanta: summed over pairs, then added to those of the scene.
-struct Load {
-    nodes: [usize; 4],
-    forces: [[i32; 3]; 4],
-    rows: [i32; 4],
-}
-
-impl Load {
-    #[inline(always)]
-    fn new(nodes: [usize; 4]) -> Self {
-        Self { nodes, forces: [[0; 3]; 4], rows: [0; 4] }
     }
 }
 
@@ -130,7 +113,7 @@ impl Load {
 struct Own<R> {
     beam: usize,
     piece: Piece<R>,
-    loads: [Load; 2],
+    loads: [Joint<4>; 2],
 }
 
 /// Inputs and sums of touching pairs.
@@ -248,7 +231,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
         sum[SUM_ENERGY] = sum[SUM_ENERGY] + push.energy;
         sum[SUM_RADIUS] = sum[SUM_RADIUS] + push.growth * self.growth;
         let offsets = &self.scene.offsets;
-        self.go_on(&mut own.loads[1], offsets.nodes(self.scene.ends, other));
+        own.loads[1].go_on(offsets.nodes(self.scene.ends, other), self.forces, self.stiffness);
         let nodes = [own.loads[0].nodes, own.loads[1].nodes];
         let pair = Pair { weights: [offsets.weights(beam), offsets.weights(other)], strengths, rest };
         let pressed = norm(push.total());
@@ -269,38 +252,6 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
         let most_weights = offsets.most_weights(beam) + offsets.most_weights(other);
         pair.add_rows(&mut own.loads, self.per_stiffness, &push, most_weights);
         depth
-    }
-
-    /// Adds the load of a node to the forces and the stiffness of the scene.
-    #[inline(always)]
-    fn give(&self, load: &Load, n: usize) {
-        if load.rows[n] != 0 || load.forces[n] != [0; 3] {
-            add_force(self.forces, load.nodes[n], load.forces[n]);
-            self.stiffness[load.nodes[n]].fetch_add(load.rows[n], Ordering::Relaxed);
-        }
-    }
-
-    /// Adds the loads of all nodes.
-    #[inline(always)]
-    fn give_all(&self, load: &Load) {
-        for n in 0..4 {
-            self.give(load, n);
-        }
-    }
-
-    /// Goes on to other nodes: the next piece of a thread shares three with the one before.
-    #[inline(always)]
-    fn go_on(&self, load: &mut Load, nodes: [usize; 4]) {
-        if load.nodes[1] == nodes[0] && load.nodes[2] == nodes[1] && load.nodes[3] == nodes[2] {
-            self.give(load, 0);
-            for n in 0..3 {
-                (load.forces[n], load.rows[n]) = (load.forces[n + 1], load.rows[n + 1]);
-            }
-            (load.nodes, load.forces[3], load.rows[3]) = (nodes, [0; 3], 0);
-        } else {
-            self.give_all(load);
-            *load = Load::new(nodes);
-        }
     }
 
     /// Adds damping, and friction of stiffness `tangential` (N/mm), to an elastic force of size `pressed` (N), at its point of
@@ -416,7 +367,7 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
                 continue;
             }
             let nodes = touch.scene.offsets.nodes(touch.scene.ends, beam);
-            let loads = [Load::new(nodes), Load::new([0; 4])];
+            let loads = [Joint::new(nodes), Joint::new([0; 4])];
             let mut own = Own { beam, piece: touch.scene.piece(beam), loads };
             let mut depth = zero;
             for slot in 0..count {
@@ -426,8 +377,8 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
                 }
             }
             if depth > zero {
-                touch.give_all(&own.loads[0]);
-                touch.give_all(&own.loads[1]);
+                own.loads[0].finish(touch.forces, touch.stiffness);
+                own.loads[1].finish(touch.forces, touch.stiffness);
                 touching += 1;
                 deepest = deepest.max(depth);
             }

@@ -8,6 +8,7 @@
 //! same for elements alone, so that a few slivers at cut edges do not limit a scene. Without contact-aware mass scaling, the
 //! largest K/m of contact is reported for the choice of the time step.
 
+use super::BLOCK;
 use crate::contact::status::{self, CONTACT_RATE, FASTEST};
 use crate::elements::{self, LANES};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
@@ -29,9 +30,6 @@ pub const BENT: usize = 3;
 pub const NONE: u32 = u32::MAX;
 /// Constants of nodal slots shared with the twins.
 pub const CONSTANTS: [Constant; 4] = constants![uint: SOLID, THREAD, BENT, NONE];
-
-/// Nodes assembled together, so that the loops over each axis fill registers.
-const BLOCK: usize = 64;
 
 /// Constants of the stage.
 #[repr(C)]
@@ -247,17 +245,18 @@ fn solid<R: Real>((slots, hexes): (&[u32], &[R]), node: usize) -> [R; 3] {
 fn thread<R: Real>((slots, beams): (&[u32], &[R]), bends: Option<(&[u32], &[R])>, node: usize) -> [R; 3] {
     let mut force = [R::from_f64(0.0); 3];
     // the node is the first of one beam and the second of another
-    for (slot, sign) in slots[THREAD * node..][..THREAD].iter().zip([1.0, -1.0]) {
-        if *slot != NONE {
-            add(&mut force, &beams[3 * *slot as usize..][..3], sign);
+    for (at, sign) in [(0, 1.0), (1, -1.0)].iter() {
+        let slot = slots[THREAD * node + at];
+        if slot != NONE {
+            add(&mut force, &beams[3 * slot as usize..][..3], *sign);
         }
     }
     if let Some((slots, bends)) = bends {
-        for (slot, signs) in slots[BENT * node..][..BENT].iter().zip([[1.0, 0.0], [-1.0, 1.0], [0.0, -1.0]]) {
-            if *slot != NONE {
-                for (k, sign) in signs.into_iter().enumerate().filter(|(_, s)| *s != 0.0) {
-                    add(&mut force, &bends[6 * *slot as usize + 3 * k..][..3], sign);
-                }
+        // of three bends: the first node, the middle node with both forces, and the last node
+        for (at, end, sign) in [(0, 0, 1.0), (1, 0, -1.0), (1, 1, 1.0), (2, 1, -1.0)].iter() {
+            let slot = slots[BENT * node + at];
+            if slot != NONE {
+                add(&mut force, &bends[6 * slot as usize + 3 * end..][..3], *sign);
             }
         }
     }

@@ -15,6 +15,7 @@
 //! group, or of consecutive groups of one line, such as threads. The WGSL twin gives each line a workgroup and solves the same
 //! system, bordered by its last row, by parallel cyclic reduction.
 
+use super::BLOCK;
 use super::tridiagonal::{BORDER, COUPLING, DIAGONAL, RIGHT, Systems};
 use crate::elements::{self, LANES};
 use crate::kernel::buffer::CacheLine;
@@ -22,10 +23,10 @@ use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Slot, constants, slot};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::{self, QUANTUM};
+use crate::kernel::scratch;
 use crate::kernel::shader::{Shader, Share, when};
 use crate::kernel::stage::{Io, Kernel, Scatter};
 use bytemuck::{Pod, Zeroable};
-use std::cell::RefCell;
 use std::ops::Range;
 
 /// A group of lines of equal length with consecutive nodes.
@@ -46,9 +47,6 @@ pub struct Group {
 
 /// Integers per group in the table.
 const GROUP: usize = size_of::<Group>() / 4;
-/// Segments computed together, so that the loops over them fill registers.
-const BLOCK: usize = 64;
-
 /// Constants of the stage.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -73,11 +71,6 @@ const SLOTS: [Slot; 8] = [
 /// The correction of accelerations; with `PERIODIC`, lines deform with F̄ and may close through the cell.
 pub struct FibreLines<const PERIODIC: bool>;
 
-thread_local! {
-    /// Work space of the systems and the directions of lines.
-    static SCRATCH: RefCell<Vec<CacheLine>> = const { RefCell::new(Vec::new()) };
-}
-
 impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
     const SHADER: Shader = Shader {
         defines: &[when(PERIODIC, "PERIODIC")],
@@ -94,8 +87,8 @@ impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
         let nodes = Nodes::new(io);
         let mut correction = io.scatter(slot!(&SLOTS, "correction"));
         let mut block = Block::new();
-        // taken, not borrowed in a closure, because the closure would not be compiled for the instruction set
-        let mut memory = SCRATCH.take();
+        // of the systems and the directions of lines
+        let mut memory = scratch::take::<Vec<CacheLine>>();
         for item in items {
             let (mut lines, mut count) = ([Line::default(); LANES], 0);
             for group in bundle(groups, item) {
@@ -108,7 +101,7 @@ impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
                 solve::<L, PERIODIC>(&nodes, &lines[..count], &mut memory, &mut block, &mut correction);
             }
         }
-        SCRATCH.set(memory);
+        scratch::put_back(memory);
     }
 }
 

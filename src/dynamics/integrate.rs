@@ -4,6 +4,7 @@
 //! v⁺ = ((1 − α dt/2) v⁻ + a dt)/(1 + α dt/2), then w⁺ = w + v⁺ dt. Work is computed with the mean velocity (v⁻ + v⁺)/2, so the
 //! change of kinetic energy is exactly the work of all forces. Only active effects are computed and their work recorded.
 
+use super::BLOCK;
 use crate::contact::status;
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Slot, constants, slot};
@@ -69,9 +70,6 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
 {
     const WORKS: Works = Works { damping: DAMPING, inertia: LINES || MASS_ADDED, gravity: GRAVITY };
 }
-
-/// Nodes integrated together, so that the loops over each axis fill registers.
-const BLOCK: usize = 64;
 
 /// Factors on the old velocity and on the acceleration.
 #[inline(always)]

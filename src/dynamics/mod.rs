@@ -7,3 +7,6 @@ pub mod integrate;
 pub mod time_step;
 pub mod totals;
 pub mod tridiagonal;
+
+/// Nodes treated together, so that loops over each axis fill registers.
+const BLOCK: usize = 64;

@@ -287,7 +287,7 @@ impl<'a, L: Lane> Lanes<'a, L> {
 
 /// The same tensor in every lane.
 #[inline(always)]
-fn splat_tensor<L: Lane>(a: &Tensor<L::Scalar>) -> Tensor<L> {
+pub fn splat_tensor<L: Lane>(a: &Tensor<L::Scalar>) -> Tensor<L> {
     let mut splat = [[L::splat(a[0][0]); 3]; 3];
     for i in 0..3 {
         for j in 0..3 {

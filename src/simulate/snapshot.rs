@@ -146,8 +146,8 @@ impl Simulation {
             self.capacity = capacity;
             // in a new backend all prescribed motion acts until the next burst looks at the time
             self.acting = usize::MAX;
-            self.is_listed_anew = true;
         }
+        self.is_listed_anew = true;
         let changing = self.changing();
         let own = changing.iter().map(|b| (self.model.plan.buffers[b.0].name, self.backend.bytes(*b).len()));
         let there = buffers.iter().zip(contents).map(|((name, _), bytes)| (name.as_str(), bytes.len()));

@@ -182,3 +182,21 @@ fn the_contact_skin_changes_no_motion() {
         assert!(motion == same, "with a skin of {skin} mm");
     }
 }
+
+/// A state may be taken just after a search, whose lists no step has seen yet.
+#[test]
+fn a_state_that_is_restored_goes_on_with_the_same_bits() {
+    let mut cell = start(&coarse_cell(), F32);
+    for moment in 1..=20 {
+        let time = 1e-5 * f64::from(moment);
+        advance(&mut cell, time);
+        let (host, buffers) = cell.snapshot();
+        let layout: Vec<_> = buffers.iter().map(|(name, bytes)| (String::from(*name), bytes.len())).collect();
+        let contents: Vec<_> = buffers.into_iter().map(|(_, bytes)| bytes).collect();
+        advance(&mut cell, time + 8e-6);
+        let hash = cell.state_hash();
+        cell.restore(host, &layout, &contents).unwrap();
+        advance(&mut cell, time + 8e-6);
+        assert_eq!(cell.state_hash(), hash, "from {time:e} s");
+    }
+}
