@@ -16,8 +16,10 @@ pub enum Accuracy {
     Preview,
     /// The mesh of the paper (Zheng et al.), 480 beams in the shipped cell: `resolution.beams_per_lap` 60.
     Paper,
-    /// For results: `resolution.beams_per_lap` 120, and steps up to 1 µs (`integration.dt_max_s` 1e-6) with elements made heavy
-    /// enough for them (`effects.contact_mass.least_limit_s` 2.3e-6).
+    /// For daily work, as in the shipped cell: steps up to 1.5 µs (`integration.dt_max_s` 1.5e-6) with elements made heavy enough
+    /// for them (`effects.contact_mass.least_limit_s` 1.75e-6).
+    Standard,
+    /// For results: `resolution.beams_per_lap` 120, and the steps of `standard`.
     Engineering,
     /// Reference for the others: `resolution.finer` 1.5, `resolution.beams_per_lap` 90, `integration.precision` f64,
     /// `integration.dt_max_s` 2.5e-7.
@@ -34,11 +36,15 @@ impl Accuracy {
                 fields
             }
             Self::Paper => json!({ "resolution": { "beams_per_lap": 60 } }),
-            Self::Engineering => json!({
-                "resolution": { "beams_per_lap": 120 },
-                "integration": { "dt_max_s": 1e-6 },
-                "effects": { "contact_mass": { "least_limit_s": 2.3e-6 } }
+            Self::Standard => json!({
+                "integration": { "dt_max_s": 1.5e-6 },
+                "effects": { "contact_mass": { "least_limit_s": 1.75e-6 } }
             }),
+            Self::Engineering => {
+                let mut fields = json!({ "resolution": { "beams_per_lap": 120 } });
+                fill(&mut fields, &Self::Standard.fields());
+                fields
+            }
             Self::Reference => json!({
                 "resolution": { "finer": 1.5, "beams_per_lap": 90 },
                 "integration": { "precision": "f64", "dt_max_s": 2.5e-7 }

@@ -77,6 +77,13 @@ pub enum Along {
     ForceNPerMm(#[schemars(range(min = -1000, max = 1000))] f64),
 }
 
+impl Along {
+    /// Whether the stretch follows a membrane force.
+    pub fn is_driven(&self) -> bool {
+        matches!(self, Self::CornerDriven | Self::ForceNPerMm(_))
+    }
+}
+
 fn whole() -> f64 {
     1.0
 }

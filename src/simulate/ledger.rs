@@ -1,6 +1,6 @@
 //! The energy balance: energy stored now, and work put in and lost since the start.
 
-use super::{Simulation, StressMean, WINDOW};
+use super::{Simulation, StressMean};
 use crate::contact::{status, sums};
 use crate::error::Result;
 use crate::kernel::stage::Stage;
@@ -191,7 +191,7 @@ impl Simulation {
         }
         self.stress.steps += steps;
         let middle = 0.5 * (from.max(0.0) + to);
-        let usual = WINDOW as f64 * self.dt;
+        let usual = self.full_window() as f64 * self.dt;
         self.stretch.see(mean, [middle, self.schedule.load(middle).angle], usual, self.area());
     }
 

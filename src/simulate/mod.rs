@@ -38,6 +38,8 @@ use stretch::Stretch;
 const BURST: u64 = 8;
 /// Steps between two looks at energies and limits; the longest burst.
 const WINDOW: u64 = 64;
+/// Longest time between two looks while a fibre direction is driven to a membrane force, s: they are when the control corrects.
+const CONTROL: f64 = 32e-6;
 /// Growth of the largest speed over a burst after which bursts start short again.
 const CALM: f64 = 1.4;
 /// Relative change of the shear rate over a window above which windows are as short as a burst. External work is the mean stress
@@ -285,12 +287,17 @@ impl Simulation {
         phases.get(self.schedule.phase_at(self.time + 0.5 * self.dt)).map_or(f64::INFINITY, |phase| phase.end)
     }
 
+    /// Steps of a full window.
+    fn full_window(&self) -> u64 {
+        if self.is_driven() { ((CONTROL / self.dt).round() as u64).clamp(BURST, WINDOW) } else { WINDOW }
+    }
+
     /// Steps until the next look at energies.
     fn window(&self) -> u64 {
-        let rate = |time: f64| self.row(time, self.dt, self.dt).rate;
-        let (now, then) = (rate(self.time), rate(self.time + WINDOW as f64 * self.dt));
+        let (rate, full) = (|time: f64| self.row(time, self.dt, self.dt).rate, self.full_window());
+        let (now, then) = (rate(self.time), rate(self.time + full as f64 * self.dt));
         let change = largest([0, 1, 2].map(|i| [0, 1, 2].map(|j| then[i][j] - now[i][j])));
-        if change > STEADY * largest(then).max(largest(now)) { BURST } else { WINDOW }
+        if change > STEADY * largest(then).max(largest(now)) { BURST } else { full }
     }
 
     /// First search, first energies, first time step.

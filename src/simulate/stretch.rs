@@ -13,7 +13,7 @@
 //! does. K then falls gradually until force and stretch oscillate together, which reveals it. Where the stretch hardly changes, K
 //! is that of straight fibres, and the control is slow and safe.
 
-use super::{Simulation, WINDOW};
+use super::Simulation;
 use crate::kernel::record::{Record, Recorded};
 use crate::materials;
 use crate::measure::shear;
@@ -171,13 +171,19 @@ impl Simulation {
         self.scene.mesh.period.map_or(1.0, |[x, y]| x * y)
     }
 
+    /// Whether a fibre direction of a cell is driven to a membrane force now.
+    pub(super) fn is_driven(&self) -> bool {
+        let phase = self.schedule.phases().get(self.schedule.phase_at(self.time + 0.5 * self.dt));
+        phase.is_some_and(|phase| phase.along.iter().any(Along::is_driven))
+    }
+
     /// Both fibre directions of a cell, x and y.
     pub fn fibres(&self) -> [Fibres; 2] {
         let phase = self.stretch.phase.checked_sub(1).and_then(|at| self.schedule.phases().get(at));
         let now = self.stretch();
         [0, 1].map(|k| {
             let direction = &self.stretch.directions[k];
-            let driven = phase.is_some_and(|p| matches!(p.along[k], Along::CornerDriven | Along::ForceNPerMm(_)));
+            let driven = phase.is_some_and(|phase| phase.along[k].is_driven());
             Fibres {
                 stretch: now[k],
                 force: direction.force,
@@ -189,7 +195,7 @@ impl Simulation {
 
     /// Sets the rates of stretch for the next window.
     pub(super) fn steer(&mut self) {
-        let (time, window) = (self.time, WINDOW as f64 * self.dt);
+        let (time, window) = (self.time, self.full_window() as f64 * self.dt);
         let number = self.schedule.phase_at(time + 0.5 * self.dt);
         let Some(phase) = self.schedule.phases().get(number) else { return };
         let now = self.stretch.at(time);

@@ -52,7 +52,7 @@ const PENALTIES: [&str; 4] = [
     "effects.contact.tie_n_mm",
 ];
 
-/// Reference for errors: finer, in f64, with half the time step, and loaded twice as slowly.
+/// Reference for errors: finer, in f64, with half the time step and elements light enough for it, and loaded twice as slowly.
 pub const REFERENCE: Variation = variation(
     "reference",
     "reference",
@@ -61,6 +61,7 @@ pub const REFERENCE: Variation = variation(
         (BEAMS, Times(1.35)),
         (PRECISION, To("f64")),
         (LARGEST_DT, Times(0.5)),
+        (LEAST_LIMIT, Times(0.5)),
         ("loading", Times(2.0)),
     ],
 );
@@ -74,6 +75,7 @@ pub const CHECK: Variation = variation(
         (BEAMS, Times(1.35)),
         (PRECISION, To("f64")),
         (LARGEST_DT, Times(0.5)),
+        (LEAST_LIMIT, Times(0.5)),
         ("loading", Times(2.0)),
     ],
 );
@@ -95,6 +97,7 @@ pub const PLACES: [Variation; 4] = [
 /// All points, the long ones last.
 pub const VARIATIONS: &[Variation] = &[
     variation("accuracy", "preview", &[("accuracy", To("preview"))]),
+    variation("accuracy", "standard", &[("accuracy", To("standard"))]),
     variation("accuracy", "engineering", &[("accuracy", To("engineering"))]),
     variation("mesh", "mesh × 0.5", &[(FINER, Times(0.5))]),
     variation("mesh", "mesh × 0.7", &[(FINER, Times(0.7))]),
@@ -107,8 +110,9 @@ pub const VARIATIONS: &[Variation] = &[
     variation("beams", "beams × 0.6", &[(BEAMS, Times(0.6))]),
     variation("beams", "beams × 1.5", &[(BEAMS, Times(1.5))]),
     variation("beams", "beams × 2", &[(BEAMS, Times(2.0))]),
-    variation("time step", "time step × 0.5", &[(LARGEST_DT, Times(0.5))]),
-    variation("time step", "time step × 1.5", &[(LARGEST_DT, Times(1.5))]),
+    variation("time step", "time step × 0.5", &[(LARGEST_DT, Times(0.5)), (LEAST_LIMIT, Times(0.5))]),
+    variation("time step", "time step × 1.5", &[(LARGEST_DT, Times(1.5)), (LEAST_LIMIT, Times(1.5))]),
+    variation("least limit", "true elements", &[(LEAST_LIMIT, To("0"))]),
     variation("least limit", "heavier elements", &[(LARGEST_DT, Times(2.0)), (LEAST_LIMIT, To("2.3e-6"))]),
     variation("fibre lines", "β × 0.5", &[("effects.fibre_lines.beta", Times(0.5))]),
     variation("fibre lines", "β × 2", &[("effects.fibre_lines.beta", Times(2.0))]),
