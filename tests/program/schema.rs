@@ -3,6 +3,7 @@
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
+use tricot::case::Case;
 use tricot::case::schema::{self, Shape};
 use tricot::case::validate::validate;
 use tricot::rigs::read::read;
