@@ -14,10 +14,12 @@
 #endif
 
 #if ROOT
-// Damping and friction force on a point, N, and an upper bound of its total stiffness against a body, N/mm.
+// Damping and friction force on a point, N, and row sums of the stiffness against a body, N/mm: of a feature that pushes, and of
+// damping.
 struct Rubbed {
     force: vec3<f32>,
-    rows: f32,
+    feature: f32,
+    viscous: f32,
 }
 
 // Force on a point, in quanta.
@@ -80,7 +82,7 @@ fn face_push(here: Point, entry: u32, most: f32, pushed: ptr<function, Pushed>) 
     (*pushed).push = (*pushed).push + ((pulls[0] + pulls[1]) + (pulls[2] + pulls[3])) * -1.0;
     (*pushed).energy = (*pushed).energy + push.energy;
     (*pushed).pressing = (*pushed).pressing + push.pressing;
-    (*pushed).features = (*pushed).features + push.count;
+    (*pushed).features = (*pushed).features + ((push.stiff.x + push.stiff.y) + (push.stiff.z + push.stiff.w));
     let nearer = is_nearer(pushed, point);
     if nearer {
         (*pushed).nearest = Nearest(true, entry, point.away, point.distance, point.height);
@@ -179,13 +181,14 @@ fn rub(here: Point, pushed: ptr<function, Pushed>, touch: u32) -> Rubbed {
     (*pushed).energy = (*pushed).energy + 0.5 * tangential * dot(slid.elastic, slid.elastic);
     rubbing = slid.elastic * -tangential + rubbing;
 #endif
-    let rows = (1.0 + here.size) * (here.stiff * (*pushed).features + viscous * (2.0 / row.dt));
-    let stiffness_quanta = rows / params.stiffness_quantum;
+    let weights = 1.0 + here.size;
+    let rubbed = Rubbed(rubbing, weights * here.stiff, weights * (viscous * (2.0 / row.dt)));
+    let stiffness_quanta = (rubbed.feature * (*pushed).features + rubbed.viscous) / params.stiffness_quantum;
     for (var a = 0u; a < CARRIED_BY; a++) {
         let node = carried_by(here.item, a);
         atomicAdd(&stiffness[node], to_i32(stiffness_quanta * abs(points[POINT * here.item + a])));
     }
-    return Rubbed(rubbing, rows);
+    return rubbed;
 }
 
 // Adds the forces of a face on a point to the nodes, with its share of damping and friction.
@@ -210,9 +213,11 @@ fn press(here: Point, entry: u32, pushed: ptr<function, Pushed>, rubbed: Rubbed)
         push.pull[a] = rubbed.force * -(share * point.weights[a]) + push.pull[a];
     }
     pull(here.item, around, push.pull);
-    let stiffness_quanta = rubbed.rows * share / params.stiffness_quantum;
+    // a face that has just begun to push is as stiff as any other, whatever its share of the force
     for (var a = 0u; a < 4u; a++) {
-        atomicAdd(&stiffness[around.nodes[a]], to_i32(stiffness_quanta * abs(point.weights[a])));
+        let features = select(push.stiff[a], push.stiff[a] + point.weights[a], (*pushed).inside && is_nearest);
+        let rows = rubbed.feature * features + rubbed.viscous * (share * point.weights[a]);
+        atomicAdd(&stiffness[around.nodes[a]], to_i32(rows / params.stiffness_quantum));
     }
 }
 

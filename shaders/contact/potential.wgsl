@@ -29,12 +29,13 @@ struct Nearest {
     height: f32,
 }
 
-// Forces of a face on a point, with the edges and corners that it owns: forces on its corners; energy, sum of forces, features.
+// Forces of a face on a point, with the edges and corners that it owns: forces on its corners; energy, sum of forces; bound of the
+// stiffness at each corner, in penalties.
 struct Push {
     pull: array<vec3<f32>, 4>,
     energy: f32,
     pressing: f32,
-    count: f32,
+    stiff: vec4<f32>,
 }
 
 // An evaluated face of a list.
@@ -98,20 +99,20 @@ fn add_border(push: ptr<function, Push>, here: Point, border: OnEdge, side: f32)
         let size = side * (here.stiff * depth);
         let away = border.offset * (1.0 / max(distance, 1e-12));
         add_push(push, border.weights, away, size, 0.5 * size * depth);
-        (*push).count = (*push).count + max(side, 0.0);
+        (*push).stiff = (*push).stiff + border.weights * max(side, 0.0);
     }
 }
 
 // Forces of a face, with the edges and corners in its marks.
 fn push_of_face(here: Point, q: array<vec3<f32>, 4>, bits: u32, point: Closest) -> Push {
-    var push = Push(array<vec3<f32>, 4>(), 0.0, 0.0, 0.0);
+    var push = Push(array<vec3<f32>, 4>(), 0.0, 0.0, vec4<f32>());
     let depth = here.radius - point.distance;
     if !(depth > 0.0) {
         return push;
     }
     let size = here.stiff * depth;
     add_push(&push, point.weights, point.away, size, 0.5 * size * depth);
-    push.count = 1.0;
+    push.stiff = point.weights;
     for (var a = 0u; a < 4u; a++) {
         if (bits >> a & 1u) == 1u {
             add_border(&push, here, on_edge(q, a), -1.0);

@@ -51,8 +51,8 @@ const PULL: usize = 9;
 const TOTAL: usize = 21;
 const ENERGY: usize = 24;
 const PRESSING: usize = 25;
-const COUNT: usize = 26;
-const ROWS: usize = 27;
+const STIFF: usize = 26;
+const ROWS: usize = 30;
 
 /// What was seen.
 #[derive(Default)]
@@ -72,11 +72,11 @@ pub struct Face<R> {
     pub away: Vector<R>,
     pub distance: R,
     pub height: R,
-    /// Force on the point, N, energy, mJ, sum of force magnitudes, N, and number of pushing features.
+    /// Force on the point, N, energy, mJ, sum of force magnitudes, N, and bound of the stiffness at the corners, in penalties.
     pub total: Vector<R>,
     pub energy: R,
     pub pressing: R,
-    pub count: R,
+    pub stiff: [R; 4],
 }
 
 impl<R: Real> Seen<R> {
@@ -95,7 +95,7 @@ impl<R: Real> Seen<R> {
             total: faces.array(TOTAL, column),
             energy: faces.get(ENERGY, column),
             pressing: faces.get(PRESSING, column),
-            count: faces.get(COUNT, column),
+            stiff: faces.array(STIFF, column),
         })
     }
 
@@ -315,7 +315,8 @@ impl<R: Real, const PERIODIC: bool> Look<'_, R, PERIODIC> {
             faces.store_array(PULL + 3 * a, first, push.pull[a]);
         }
         faces.store_array(TOTAL, first, push.total());
-        faces.store_array(ENERGY, first, [push.energy, push.pressing, push.count]);
+        faces.store_array(ENERGY, first, [push.energy, push.pressing]);
+        faces.store_array(STIFF, first, push.stiff);
     }
 }
 

@@ -63,19 +63,19 @@ pub struct Push<L> {
     /// Energy, mJ, and sum of the force magnitudes, N: the derivative of the energy by the radius.
     pub energy: L,
     pub pressing: L,
-    /// Number of pushing features.
-    pub count: L,
+    /// Bound of the stiffness at each corner, in penalties: its weights in the face and the corners that push. Edges only soften.
+    pub stiff: [L; 4],
 }
 
 impl<L: Lane> Push<L> {
     /// Adds, in the lanes of a mask, a `force` (N) on the point in the direction `away` from a place given by corner weights, its
-    /// `energy` (mJ), and a `count` of features.
+    /// `energy` (mJ); `stiffens` is one where this stiffens the contact, else zero.
     #[inline(always)]
-    fn add(&mut self, mask: L::Mask, (weights, away): ([L; 4], Vector<L>), force: L, energy: L, count: f64) {
+    fn add(&mut self, mask: L::Mask, (weights, away): ([L; 4], Vector<L>), force: L, energy: L, stiffens: f64) {
         self.energy = L::select(mask, self.energy + energy, self.energy);
         self.pressing = L::select(mask, self.pressing + force, self.pressing);
-        self.count = L::select(mask, self.count + L::new(count), self.count);
         for a in 0..4 {
+            self.stiff[a] = L::select(mask, self.stiff[a] + weights[a] * L::new(stiffens), self.stiff[a]);
             self.pull[a] = select(mask, fma(away, -(force * weights[a]), self.pull[a]), self.pull[a]);
         }
     }
@@ -103,7 +103,7 @@ impl<L: Lane> Push<L> {
     #[inline(always)]
     pub fn of_face(radius: L, penalty: L, q: &[Vector<L>; 4], marks: &[u32; LANES], point: &Closest<L>) -> Self {
         let (zero, depth) = (L::new(0.0), radius - point.distance);
-        let mut push = Self { pull: [[zero; 3]; 4], energy: zero, pressing: zero, count: zero };
+        let mut push = Self { pull: [[zero; 3]; 4], energy: zero, pressing: zero, stiff: [zero; 4] };
         let touches = zero.lt(depth);
         if !L::any(touches) {
             return push;
@@ -139,6 +139,7 @@ pub struct Pushed<R> {
     pub push: Vector<R>,
     pub energy: R,
     pub pressing: R,
+    /// Number of features that push: faces, corners, and the way out from the inside.
     pub features: R,
     /// Sum of the forces of faces, N.
     pub shared: R,
@@ -203,6 +204,7 @@ impl<R: Real> Pushed<R> {
         self.push = add(self.push, face.total);
         self.energy = self.energy + face.energy;
         self.pressing = self.pressing + face.pressing;
-        self.features = self.features + face.count;
+        let [a, b, c, d] = face.stiff;
+        self.features = self.features + ((a + b) + (c + d));
     }
 }

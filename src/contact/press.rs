@@ -47,7 +47,13 @@ impl<R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'_, R, FRICTION, 
         }
         let nodes = self.nodes(entry);
         let joint = corners.of(nodes, self.forces, self.stiffness);
-        joint.stiffen(rubbed.rows * share * self.per_stiffness, &face.weights);
+        // a face that has just begun to push is as stiff as any other, whatever its share of the force
+        let mut rows = [zero; 4];
+        for a in 0..4 {
+            let features = if pushed.inside && is_nearest { face.stiff[a] + face.weights[a] } else { face.stiff[a] };
+            rows[a] = rubbed.feature * features + rubbed.viscous * (share * face.weights[a]);
+        }
+        joint.stiffen(self.per_stiffness, &rows);
         let sum = scale(add(add(pull[0], pull[1]), add(pull[2], pull[3])), self.per_force);
         for sum in sum {
             if !is_in_range(self.flags, sum, nodes[0]) {

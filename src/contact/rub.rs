@@ -15,10 +15,12 @@ use crate::kernel::lane::Real;
 use crate::kernel::stage::raise;
 use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
 
-/// Damping and friction force on a point, N, and an upper bound of its total stiffness against a body, N/mm.
+/// Damping and friction force on a point, N, and row sums of the stiffness against a body, N/mm: of a feature that pushes, and of
+/// damping.
 pub(super) struct Rubbed<R> {
     pub force: Vector<R>,
-    pub rows: R,
+    pub feature: R,
+    pub viscous: R,
 }
 
 /// Viscosity, N·s/mm, for a given share of critical damping of a spring of `penalty` (N/mm) between masses of joint inverse
@@ -73,8 +75,8 @@ impl<R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'_, R, FRICTION, 
             pushed.energy = pushed.energy + half * tangential * dot(slid.elastic, slid.elastic);
             force = fma(slid.elastic, -tangential, force);
         }
-        let rows = (R::from_f64(1.0) + walk.size) * (view.penalty * pushed.features + viscosity * (two / self.row.dt));
-        Rubbed { force, rows }
+        let weights = R::from_f64(1.0) + walk.size;
+        Rubbed { force, feature: weights * view.penalty, viscous: weights * (viscosity * (two / self.row.dt)) }
     }
 
     /// Damping, friction, and the end of a body's touch; returns the forces if it still touches.
@@ -93,7 +95,7 @@ impl<R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'_, R, FRICTION, 
         let slot = place_of(keys, body, touches)?;
         let touch = &mut kept.touches[size * slot..][..size];
         let rubbed = self.rub((walk, view), pushed, touch, kept.sums);
-        self.stiffen(walk, rubbed.rows, carriers);
+        self.stiffen(walk, rubbed.feature * pushed.features + rubbed.viscous, carriers);
         let work = pushed.pressing * walk.full_radius * self.row.radius_increment;
         kept.sums[SUM_RADIUS] = kept.sums[SUM_RADIUS] + work;
         if !touches {
