@@ -23,12 +23,21 @@ struct Params {
 @group(2) @binding(1) var<uniform> params: Params;
 
 #if CONTACT
-// Contact force component in N; reset to zero.
-fn taken(at: u32) -> f32 {
+// Records a node whose sum is out of range.
+fn check_range(node: u32, sum: i32) {
+    if u32(abs(sum)) > MOST_SUM {
+        atomicOr(&status[FLAGS], FORCE_RANGE);
+        atomicStore(&status[CULPRIT], node);
+    }
+}
+
+// Contact force component of a node in N; reset to zero.
+fn taken(node: u32, at: u32) -> f32 {
     let quanta = contact_force[at];
     if quanta != 0 {
         contact_force[at] = 0;
     }
+    check_range(node, quanta);
     return f32(quanta) * params.force_quantum;
 }
 #endif
@@ -91,13 +100,14 @@ fn assemble(node: u32) {
 #endif
     }
 #if CONTACT
-    force = force + vec3<f32>(taken(node), taken(node + plane), taken(node + 2u * plane));
+    force = force + vec3<f32>(taken(node, node), taken(node, node + plane), taken(node, node + 2u * plane));
 #endif
 #if GRAVITY
     force = force + true_mass[node] * vec3<f32>(params.gravity_x, params.gravity_y, params.gravity_z);
 #endif
     var acting = mass[node];
 #if CONTACT
+    check_range(node, contact_stiffness[node]);
     let contact = f32(contact_stiffness[node]) * params.stiffness_quantum;
     contact_stiffness[node] = 0;
 #if MASS_ADDED

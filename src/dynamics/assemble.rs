@@ -31,6 +31,10 @@ pub const NONE: u32 = u32::MAX;
 /// Constants of nodal slots shared with the twins.
 pub const CONSTANTS: [Constant; 4] = constants![uint: SOLID, THREAD, BENT, NONE];
 
+/// Largest sum of contact forces or stiffness at a node, quanta. Every pair stays below an eighth of it, so that at least 24
+/// pairs must push beyond it at once for a sum to wrap unseen.
+const MOST_SUM: u32 = 1 << 30;
+
 /// Constants of the stage.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -65,7 +69,7 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
             when(BENDING, "BENDING"),
             when(GRAVITY, "GRAVITY"),
         ],
-        constants: &[&elements::CONSTANTS, &status::CONSTANTS, &CONSTANTS],
+        constants: &[&elements::CONSTANTS, &status::CONSTANTS, &CONSTANTS, &constants![uint: MOST_SUM]],
         ..Shader::new("dynamics/assemble", "assemble")
     };
     const SLOTS: &'static [Slot] = &[
@@ -169,11 +173,30 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
             if is_zero(quanta) {
                 continue;
             }
+            Self::check_range(io, first, quanta);
             for i in 0..count {
                 let sum = force[i] + R::from_i32(quanta[i]) * quantum;
                 force[i] = if quanta[i] == 0 { force[i] } else { sum };
             }
             quanta.fill(0);
+        }
+    }
+
+    /// Records a node whose sum is out of range, among nodes from `first` on.
+    #[inline(always)]
+    fn check_range<R: Real>(io: &Io<R>, first: usize, sums: &[i32]) {
+        let mut largest = 0;
+        for sum in sums {
+            largest = largest.max(sum.unsigned_abs());
+        }
+        if largest > MOST_SUM {
+            let status = io.atomic_uints(slot!(Self::SLOTS, "status", CONTACT));
+            status[status::FLAGS].fetch_or(status::FORCE_RANGE, Ordering::Relaxed);
+            for (i, sum) in sums.iter().enumerate() {
+                if sum.unsigned_abs() == largest {
+                    status[status::CULPRIT].store((first + i) as u32, Ordering::Relaxed);
+                }
+            }
         }
     }
 
@@ -187,6 +210,7 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
         let mut contact = [zero; BLOCK];
         let touches = !is_zero(quanta);
         if touches {
+            Self::check_range(io, first, quanta);
             let quantum = real(params.stiffness_quantum);
             for i in 0..count {
                 contact[i] = R::from_i32(quanta[i]) * quantum;
