@@ -1,15 +1,18 @@
-//! Cost of a step on a GPU: microseconds per step, hexahedra per second, the time of each stage by the device's own clock, the
-//! share of the step spent between dispatches, and the distance from the performance limits of the device. One scene per run:
-//! `cargo bench --bench device -- WARPS WEFTS` (2 4: the 10 × 10 mm cell; 6 12: 30 × 30 mm; 20 40: 100 × 100 mm).
+//! Cost of a step on a GPU: microseconds per step, hexahedra per second, the time of each stage by the device's own clock and its
+//! distance from the performance limits of the device, and what the host asks of the device. One scene per run:
+//! `cargo bench --bench device -- WARPS WEFTS` is a sheet of the cell (2 4: the 10 × 10 mm cell; 6 12: 30 × 30 mm; 20 40:
+//! 100 × 100 mm), `cargo bench --bench device -- CASE` the beginning of a case. The last line is the table as JSON. `--adapter NAME`
+//! takes an adapter by a part of its name, `--steps COUNT` times another number of steps.
 
 use naga::{Expression, MathFunction, Statement, TypeInner};
+use serde_json::json;
 use std::collections::HashSet;
 use std::path::Path;
 use std::time::Instant;
 use tricot::backend::gpu::Device;
 use tricot::kernel::shader::{ENTRY, Text};
 use tricot::kernel::stage::Stage;
-use tricot::rigs::read::read;
+use tricot::rigs::read::{Loaded, read};
 use tricot::run::simulation;
 use tricot::simulate::{BackendConfig, Simulation};
 
@@ -20,49 +23,91 @@ const START: f64 = 1.6e-4;
 const STEPS: u64 = 1024;
 
 fn main() {
-    let numbers: Vec<usize> = std::env::args().filter_map(|a| a.parse().ok()).collect();
-    let [warps, wefts] = if let [warps, wefts] = numbers[..] { [warps, wefts] } else { [2, 4] };
-    let device = match Device::open("") {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let option = |name: &str| {
+        let at = arguments.iter().position(|a| a == name)?;
+        arguments.get(at + 1).cloned()
+    };
+    let wanted: u64 = option("--steps").and_then(|n| n.parse().ok()).unwrap_or(STEPS);
+    let device = match Device::open(&option("--adapter").unwrap_or_default()) {
         Ok(device) => device,
         Err(error) => return println!("{error}"),
     };
-    let sets = [format!("domain.cell.warps={warps}"), format!("domain.cell.wefts={wefts}")];
-    let sets: Vec<String> = QUICK.map(String::from).into_iter().chain(sets).collect();
-    let loaded = read(Path::new("cases/unit_cell_shear.json"), &sets).unwrap_or_else(|e| panic!("{e}"));
+    let (scene, loaded) = chosen(&arguments);
     let config = BackendConfig { device: Some(device.clone()), ..BackendConfig::default() };
     let mut sheet = simulation(&loaded, config).unwrap_or_else(|e| panic!("{e}"));
     let hexes = sheet.mesh().hexes();
-    println!(
-        "{} hexes, {} beams, {} nodes; {}",
-        hexes,
-        sheet.mesh().beams(),
-        sheet.mesh().nodes.len(),
-        sheet.backend().describe()
-    );
+    let (beams, nodes) = (sheet.mesh().beams(), sheet.mesh().nodes.len());
+    println!("{scene}: {hexes} hexes, {beams} beams, {nodes} nodes; {}", sheet.backend().describe());
     go(&mut sheet, START);
-    let (before, timed, started) = (sheet.step(), sheet.backend().timings(), Instant::now());
-    let until = sheet.time() + STEPS as f64 * sheet.dt();
+    let (before, searches, timed, asked) =
+        (sheet.step(), sheet.searches(), sheet.backend().timings(), sheet.backend().traffic().unwrap_or_default());
+    let started = Instant::now();
+    let until = sheet.time() + wanted as f64 * sheet.dt();
     go(&mut sheet, until);
     let (steps, wall) = (sheet.step() - before, started.elapsed().as_secs_f64());
-    let step = wall / steps as f64;
+    let (step, per_step) = (wall / steps as f64, |count: u64| count as f64 / steps as f64);
     println!("{:.1} µs a step, {:.2} million hexes a second, {steps} steps", 1e6 * step, 1e-6 * hexes as f64 / step);
+    let traffic = sheet.backend().traffic().unwrap_or_default();
+    let searches = sheet.searches() - searches;
+    let dispatches = per_step(traffic.dispatches - asked.dispatches);
+    let [submissions, waits, found, bytes] = [
+        traffic.submissions - asked.submissions,
+        traffic.waits - asked.waits,
+        searches,
+        traffic.bytes_read - asked.bytes_read,
+    ]
+    .map(|count| 1e3 * per_step(count));
+    let [recording, waiting] = [traffic.recording_s - asked.recording_s, traffic.waiting_s - asked.waiting_s]
+        .map(|time| 1e6 * time / steps as f64);
+    println!("host, µs a step: recording {recording:.1}, waiting {waiting:.1}; {dispatches:.1} dispatches a step");
+    println!(
+        "in 1,000 steps: {submissions:.0} submissions, {waits:.0} waits, {found:.0} searches, {:.2} MB read back",
+        1e-6 * bytes
+    );
 
     let rates = device.rates();
     println!("device at best: {:.0} GB/s, {:.0} GFLOP/s", 1e-9 * rates.bytes, 1e-9 * rates.operations);
     println!("{:20} {:>12} {:>12} {:>12}", "stage", "µs a step", "floor, µs", "of floor");
     let plan = sheet.model.plan.clone();
-    let mut sum = 0.0;
+    let (mut sum, mut stages) = (0.0, serde_json::Map::new());
     for (name, time) in sheet.backend().timings() {
         let old = timed.iter().find(|(n, _)| *n == name).map_or(0.0, |(_, t)| *t);
         let spent = (time - old) / steps as f64;
         sum += spent;
-        let stages = plan.step.iter().filter(|s| s.name() == name && !s.items().is_empty());
-        let floor = stages.map(|s| floor(&sheet, s, rates.bytes, rates.operations)).fold(0.0, |a, b| a + b);
+        let of_step = plan.step.iter().filter(|s| s.name() == name && !s.items().is_empty());
+        let floor = of_step.map(|s| floor(&sheet, s, rates.bytes, rates.operations)).fold(0.0, |a, b| a + b);
         // only the stages of every step have a lower bound
-        let floor = (floor > 0.0).then(|| format!("{:12.2} {:10.0} %", 1e6 * floor, 100.0 * floor / spent));
-        println!("{name:20} {:12.2} {}", 1e6 * spent, floor.unwrap_or_default());
+        let floor = (floor > 0.0).then_some(floor);
+        let shown = floor.map(|floor| format!("{:12.2} {:10.0} %", 1e6 * floor, 100.0 * floor / spent));
+        println!("{name:20} {:12.2} {}", 1e6 * spent, shown.unwrap_or_default());
+        stages.insert(name.into(), json!({ "us": 1e6 * spent, "floor_us": floor.map(|floor| 1e6 * floor) }));
     }
     println!("between dispatches: {:.0} % of the step", 100.0 * (1.0 - sum / step));
+    let adapter = device.listed();
+    let table = json!({
+        "scene": scene, "adapter": adapter.name, "driver": adapter.driver, "interface": adapter.interface, "hexes": hexes,
+        "beams": beams, "nodes": nodes, "steps": steps, "us_per_step": 1e6 * step, "hexes_per_s": hexes as f64 / step,
+        "recording_us_per_step": recording, "waiting_us_per_step": waiting, "dispatches_per_step": dispatches,
+        "submissions_per_1000_steps": submissions, "waits_per_1000_steps": waits, "searches_per_1000_steps": found,
+        "bytes_read_per_1000_steps": bytes, "device_bytes_per_s": rates.bytes, "device_operations_per_s": rates.operations,
+        "stages": stages
+    });
+    println!("{table}");
+}
+
+/// The scene of the arguments: a case, or a sheet of the cell, tightened quickly.
+fn chosen(arguments: &[String]) -> (String, Loaded) {
+    if let Some(case) = arguments.iter().find(|a| a.ends_with(".json")) {
+        let quick = [QUICK[0].to_owned(), "steps.1.hold.time_s=5e-5".to_owned()];
+        return (case.clone(), read(Path::new(case), &quick).unwrap_or_else(|e| panic!("{e}")));
+    }
+    let numbers: Vec<usize> = arguments.iter().map_while(|a| a.parse().ok()).collect();
+    let [warps, wefts] = if let [warps, wefts, ..] = numbers[..] { [warps, wefts] } else { [2, 4] };
+    let sets = [format!("domain.cell.warps={warps}"), format!("domain.cell.wefts={wefts}")];
+    let sets: Vec<String> = QUICK.map(String::from).into_iter().chain(sets).collect();
+    let loaded = read(Path::new("cases/unit_cell_shear.json"), &sets).unwrap_or_else(|e| panic!("{e}"));
+    (format!("sheet of {warps} × {wefts}"), loaded)
 }
 
 fn go(sheet: &mut Simulation, until: f64) {

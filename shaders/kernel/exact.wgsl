@@ -1,8 +1,9 @@
-// Arithmetic that a device must get right to the last bit.
+// What a device must get right: to the last bit, or closely.
 
 #include "kernel/position"
 
 #if ROOT
+#if exact
 fn exact(item: u32) {
     var q = quanta[item];
     var r = remainders[item];
@@ -14,4 +15,28 @@ fn exact(item: u32) {
     remainders[item] = r;
     atomicAdd(&sum[0], q);
 }
+#endif
+
+#if together
+var<workgroup> numbers: array<u32, WORKGROUP>;
+
+fn together(item: u32, local: u32) {
+    numbers[local] = item * local + local * local;
+    for (var half = WORKGROUP / 2u; half > 0u; half = half / 2u) {
+        workgroupBarrier();
+        if local < half {
+            numbers[local] = numbers[local] + numbers[local + half];
+        }
+    }
+    if local == 0u {
+        sums[item] = numbers[0];
+    }
+}
+#endif
+
+#if roots
+fn roots(item: u32) {
+    out[item] = sqrt(numerators[item] / denominators[item]);
+}
+#endif
 #endif

@@ -4,12 +4,13 @@
 //! does not depend on the number of threads or on which thread takes a chunk.
 
 use super::Backend;
-use crate::kernel::buffer::{Array, Buffer, Description, Kind};
+use crate::kernel::buffer::{Array, Buffer, Contents, Description, Kind};
 use crate::kernel::interface::{Access, Slot};
 use crate::kernel::lane::{Isa, Real};
 use crate::kernel::row::Row;
 use crate::kernel::stage::{Binding, Code, Io, Stage};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -18,6 +19,7 @@ pub struct Cpu<R: Real> {
     arrays: Vec<Array>,
     kinds: Vec<Kind>,
     saved: Vec<(Buffer, Array)>,
+    requested: Vec<Contents>,
     isa: Isa,
     pool: Option<rayon::ThreadPool>,
     threads: usize,
@@ -28,20 +30,20 @@ pub struct Cpu<R: Real> {
 
 /// A precision that the CPU can run, with the matching function of a kernel.
 pub trait Precision: Real {
-    fn function(kernel: &Code) -> fn(&Io<Self>, std::ops::Range<usize>);
+    fn function(kernel: &Code) -> fn(&Io<Self>, Range<usize>);
     const NAME: &'static str;
 }
 
 impl Precision for f32 {
     const NAME: &'static str = "f32";
-    fn function(kernel: &Code) -> fn(&Io<f32>, std::ops::Range<usize>) {
+    fn function(kernel: &Code) -> fn(&Io<f32>, Range<usize>) {
         kernel.f32
     }
 }
 
 impl Precision for f64 {
     const NAME: &'static str = "f64";
-    fn function(kernel: &Code) -> fn(&Io<f64>, std::ops::Range<usize>) {
+    fn function(kernel: &Code) -> fn(&Io<f64>, Range<usize>) {
         kernel.f64
     }
 }
@@ -57,6 +59,7 @@ impl<R: Precision> Cpu<R> {
             arrays: buffers.iter().map(Array::new::<R>).collect(),
             kinds: buffers.iter().map(|description| description.kind).collect(),
             saved: Vec::new(),
+            requested: Vec::new(),
             isa,
             pool,
             threads,
@@ -90,7 +93,7 @@ struct Group<'a, R: Real> {
 struct Bound<'a, R: Real> {
     bindings: Vec<Binding>,
     params: &'a [u8],
-    function: fn(&Io<R>, std::ops::Range<usize>),
+    function: fn(&Io<R>, Range<usize>),
     isa: Isa,
     spent: &'a AtomicU64,
 }
@@ -101,7 +104,7 @@ unsafe impl<R: Real> Sync for Bound<'_, R> {}
 /// A range of items of one stage in a group.
 struct Chunk {
     stage: usize,
-    items: std::ops::Range<usize>,
+    items: Range<usize>,
 }
 
 impl<R: Real> Group<'_, R> {
@@ -185,8 +188,30 @@ impl<R: Precision> Backend for Cpu<R> {
         }
     }
 
+    fn request(&mut self, buffer: Buffer) {
+        let contents = match self.kinds[buffer.0] {
+            Kind::Scalar => Contents::Scalars(self.scalars(buffer)),
+            Kind::Int => Contents::Ints(self.ints(buffer)),
+            Kind::Uint => Contents::Uints(self.uints(buffer)),
+        };
+        self.requested.push(contents);
+    }
+
+    fn receive(&mut self) -> Vec<Contents> {
+        std::mem::take(&mut self.requested)
+    }
+
+    fn copy(&mut self, from: Buffer, to: Buffer) {
+        let bytes = self.bytes(from);
+        self.set_bytes(to, &bytes);
+    }
+
     fn clear(&mut self, buffer: Buffer) {
         self.arrays[buffer.0].clear();
+    }
+
+    fn clear_part(&mut self, buffer: Buffer, numbers: Range<usize>) {
+        self.arrays[buffer.0].clear_part(numbers);
     }
 
     fn bytes(&self, buffer: Buffer) -> Vec<u8> {

@@ -8,9 +8,10 @@ pub mod gpu;
 #[path = "no_gpu.rs"]
 pub mod gpu;
 
-use crate::kernel::buffer::Buffer;
+use crate::kernel::buffer::{Buffer, Contents};
 use crate::kernel::row::Row;
 use crate::kernel::stage::Stage;
+use std::ops::Range;
 
 /// A machine that runs stages. Numbers cross to the host as f64, whatever the precision of the run.
 pub trait Backend {
@@ -24,8 +25,16 @@ pub trait Backend {
     fn uints(&self, buffer: Buffer) -> Vec<u32>;
     /// Replaces the scalars of a buffer.
     fn set_scalars(&mut self, buffer: Buffer, values: &[f64]);
+    /// Asks for the numbers of a buffer as they are after all that was run so far. A device goes on meanwhile.
+    fn request(&mut self, buffer: Buffer);
+    /// The numbers that were asked for, in order; a device is waited for once.
+    fn receive(&mut self) -> Vec<Contents>;
+    /// Copies the numbers of a buffer to another of the same kind and length.
+    fn copy(&mut self, from: Buffer, to: Buffer);
     /// Sets every number of a buffer to zero.
     fn clear(&mut self, buffer: Buffer);
+    /// Sets some numbers of a buffer to zero.
+    fn clear_part(&mut self, buffer: Buffer, numbers: Range<usize>);
     /// Bytes of a buffer, for hashes and checkpoints.
     fn bytes(&self, buffer: Buffer) -> Vec<u8>;
     /// Replaces the bytes of a buffer of the same length.
@@ -40,6 +49,24 @@ pub trait Backend {
     }
     /// Seconds spent in each stage so far, by name, in the order of first use.
     fn timings(&self) -> Vec<(&'static str, f64)>;
+    /// What a device was asked to do so far.
+    fn traffic(&self) -> Option<Traffic> {
+        None
+    }
     /// One line for reports.
     fn describe(&self) -> String;
+}
+
+/// What the host asked a device to do, and its own time for it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Traffic {
+    pub dispatches: u64,
+    pub submissions: u64,
+    /// Times that the host waited for the device.
+    pub waits: u64,
+    /// Bytes that were read back.
+    pub bytes_read: u64,
+    /// Time for recording and submitting, and for waiting, s.
+    pub recording_s: f64,
+    pub waiting_s: f64,
 }

@@ -90,11 +90,11 @@ pub const fn slot_state(friction: bool) -> usize {
     if friction { 4 } else { 1 }
 }
 
-/// State of the candidates of a carrier or beam: from the last full search, from a later partial search, or never searched.
+/// State of the candidates of a carrier or beam: never searched, from the last full search, or from a later partial search.
 pub mod found {
-    pub const WITH_ALL: u32 = 0;
-    pub const SINCE: u32 = 1;
-    pub const NEVER: u32 = 2;
+    pub const NEVER: u32 = 0;
+    pub const WITH_ALL: u32 = 1;
+    pub const SINCE: u32 = 2;
 }
 
 /// Constants of candidates and sums shared with the twins.
@@ -106,29 +106,33 @@ pub const EMPTY: u32 = u32::MAX;
 /// Places in the status buffer.
 pub mod status {
     use crate::kernel::interface::{Constant, constants};
+    use std::ops::Range;
 
     /// Flags below.
     pub const FLAGS: usize = 0;
     /// Largest displacement since the last search, bits of an f32, mm.
     pub const TRAVEL: usize = 1;
+    /// Largest speed of a node, bits of an f32, mm/s.
+    pub const SPEED: usize = 2;
+    /// Number of carriers and beams whose candidates were searched.
+    pub const SEARCHED: usize = 3;
     /// Largest penetration of a thread into a yarn, of yarns, of threads; bits of an f32, mm.
-    pub const PENETRATION: [usize; 3] = [2, 3, 4];
+    pub const PENETRATION: [usize; 3] = [4, 5, 6];
     /// These penetrations, mm.
     pub fn penetration(status: &[u32]) -> [f64; 3] {
         PENETRATION.map(|place| f64::from(f32::from_bits(status[place])))
     }
     /// Largest contact stiffness over mass, bits of an f32, 1/s².
-    pub const CONTACT_RATE: usize = 5;
+    pub const CONTACT_RATE: usize = 7;
     /// Nodes and beams in contact.
-    pub const TOUCHING: [usize; 3] = [6, 7, 8];
-    /// Largest speed of a node, bits of an f32, mm/s.
-    pub const SPEED: usize = 9;
+    pub const TOUCHING: [usize; 3] = [8, 9, 10];
     /// A node whose contact force overflowed its integer.
-    pub const CULPRIT: usize = 10;
-    /// Number of carriers and beams whose candidates were searched.
-    pub const SEARCHED: usize = 11;
+    pub const CULPRIT: usize = 11;
     /// Largest speed of a node of a yarn and of a thread in the last step, bits of an f32, mm/s.
     pub const FASTEST: [usize; 2] = [12, 13];
+    /// What counts from one search to the next, and from one look at energies to the next.
+    pub const SINCE_SEARCH: Range<usize> = FLAGS..PENETRATION[0];
+    pub const SINCE_LOOK: Range<usize> = PENETRATION[0]..CULPRIT;
     /// Size of the buffer.
     pub const SIZE: usize = 16;
 

@@ -2,6 +2,7 @@
 
 use super::lane::Real;
 use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
 
 /// Number type of a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,6 +110,12 @@ impl Array {
         self.lines.fill(CacheLine::zeroed());
     }
 
+    /// Sets some numbers to zero.
+    pub fn clear_part(&mut self, numbers: Range<usize>) {
+        let size = self.size;
+        bytemuck::cast_slice_mut::<_, u8>(&mut self.lines)[numbers.start * size..numbers.end * size].fill(0);
+    }
+
     /// Address of the first number; it is stable for the lifetime of the array.
     pub fn address(&mut self) -> *mut u8 {
         self.lines.as_mut_ptr().cast()
@@ -125,5 +132,25 @@ impl Array {
     /// Bytes per number.
     pub fn size(&self) -> usize {
         self.size
+    }
+}
+
+/// Numbers of a buffer on the host.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Contents {
+    Scalars(Vec<f64>),
+    Ints(Vec<i32>),
+    Uints(Vec<u32>),
+}
+
+impl Contents {
+    /// The scalars of a buffer of scalars; none of another.
+    pub fn scalars(self) -> Vec<f64> {
+        if let Self::Scalars(values) = self { values } else { Vec::new() }
+    }
+
+    /// The unsigned integers of a buffer of them; none of another.
+    pub fn uints(self) -> Vec<u32> {
+        if let Self::Uints(values) = self { values } else { Vec::new() }
     }
 }

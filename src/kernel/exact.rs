@@ -1,11 +1,12 @@
-//! Arithmetic that a device must get right to the last bit: whole quanta with remainders over many small steps, and
-//! order-independent integer sums. Compilers that re-associate floating-point sums would lose the steps.
+//! What a device must get right: to the last bit whole quanta with remainders over many small steps, order-independent integer
+//! sums (compilers that re-associate floating-point sums would lose the steps), and memory that a workgroup shares; closely,
+//! divisions and square roots.
 
-use super::buffer::Kind::{Int, Scalar};
+use super::buffer::Kind::{Int, Scalar, Uint};
 use super::interface::{Slot, constants, slot};
 use super::lane::{Lane, Real};
 use super::position::{self, QUANTUM, carry, quanta};
-use super::shader::Shader;
+use super::shader::{Shader, Share, WORKGROUP};
 use super::stage::{Io, Kernel};
 use std::ops::Range;
 use std::sync::atomic::Ordering;
@@ -15,6 +16,10 @@ pub const STEPS: usize = 2048;
 
 /// Marches every item by many small steps.
 pub struct Exact;
+/// Sums of numbers that the invocations of a workgroup share: the upper half is added to the lower until one sum is left.
+pub struct Together;
+/// The square roots of ratios.
+pub struct Roots;
 
 /// Start of item `i`, quanta, and its increment per step, mm: from a thousandth of a quantum to a hundred quanta.
 pub fn start(item: usize) -> (i32, f64) {
@@ -48,6 +53,41 @@ impl Kernel for Exact {
             }
             (*quanta.at(0, item), *remainders.at(0, item)) = (q, r);
             sum[0].fetch_add(q, Ordering::Relaxed);
+        }
+    }
+}
+
+impl Kernel for Together {
+    const SHADER: Shader = Shader {
+        share: Share::Workgroups(1),
+        constants: &[&position::CONSTANTS],
+        ..Shader::new("kernel/exact", "together")
+    };
+    const SLOTS: &'static [Slot] = &[Slot::row("sums", Uint, 1)];
+    const WIDE: bool = false;
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let mut sums = io.own::<u32>(slot!(Self::SLOTS, "sums"));
+        for item in items {
+            *sums.at(0, item) = (0..WORKGROUP).map(|local| (item * local + local * local) as u32).sum();
+        }
+    }
+}
+
+impl Kernel for Roots {
+    const SHADER: Shader = Shader { constants: &[&position::CONSTANTS], ..Shader::new("kernel/exact", "roots") };
+    const SLOTS: &'static [Slot] =
+        &[Slot::read("numerators", Scalar), Slot::read("denominators", Scalar), Slot::row("out", Scalar, 1)];
+    const WIDE: bool = false;
+
+    #[inline(always)]
+    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
+        let (numerators, denominators) =
+            (io.scalars(slot!(Self::SLOTS, "numerators")), io.scalars(slot!(Self::SLOTS, "denominators")));
+        let mut out = io.own::<L::Scalar>(slot!(Self::SLOTS, "out"));
+        for item in items {
+            *out.at(0, item) = (numerators[item] / denominators[item]).sqrt();
         }
     }
 }

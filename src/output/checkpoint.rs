@@ -23,7 +23,7 @@ pub const FOLDER: &str = "state";
 /// Number of checkpoints kept, besides those from the end of a load step.
 const KEPT: usize = 2;
 const EXTENSION: &str = "state";
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 /// First bytes of the header of every checkpoint.
 const START: &[u8] = b"{\"format\":";
 

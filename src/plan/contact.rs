@@ -5,7 +5,6 @@ use super::builder::Builder;
 use super::nodes::Nodes;
 use super::surfaces::{Carried, Surfaces};
 use super::{Active, Capacity, ContactPoint, Tables};
-use crate::contact::found::NEVER;
 use crate::contact::skin::Shares;
 use crate::contact::{
     EMPTY, Params, candidates, grid, memory, pairs, penalty, slot_state, sums, surface, threads, tie,
@@ -262,7 +261,7 @@ impl ContactScene<'_> {
         let gaps = b.add(names.gaps, Kind::Scalar, row * count, true, Initial::Zero);
         let keys = b.add(names.keys, Kind::Uint, places * count, true, empty(places * count));
         let touches = b.add(names.touches, Kind::Scalar, size * slots * count, true, Initial::Zero);
-        let found = b.add(names.found, Kind::Uint, lists, true, Initial::Uint(vec![NEVER; lists]));
+        let found = b.add(names.found, Kind::Uint, lists, true, Initial::Zero);
         let sums = b.scratch(names.sums, each * count);
 
         let &Nodes { reference, quanta, remainder, velocity, mass, status, .. } = self.nodes;
@@ -303,7 +302,7 @@ impl ContactScene<'_> {
         let keys = b.add("beam pairs", Kind::Uint, slots * beams, true, Initial::Uint(vec![EMPTY; slots * beams]));
         let state = b.add("beam pair state", Kind::Scalar, size * slots * beams, true, Initial::Zero);
         let sums = b.scratch("beam pair sums", each * beams);
-        let found = b.add("when pairs were found", Kind::Uint, beams, true, Initial::Uint(vec![NEVER; beams]));
+        let found = b.add("when pairs were found", Kind::Uint, beams, true, Initial::Zero);
         let &Nodes { reference, quanta, remainder, velocity, mass, status, .. } = self.nodes;
         let both = wires![reference, quanta, remainder, keys: (keys, slots), states: (state, size * slots), status];
         let both = [&both[..], &self.lines(offsets)].concat();

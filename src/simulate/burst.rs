@@ -32,11 +32,22 @@ impl Simulation {
         self.backend.run(&self.model.plan.step, &rows[..last]);
         self.time = time;
         self.step += steps;
-        let looked = if looks { Some(self.looked_at_step(rows[last])?) } else { None };
+        if looks {
+            self.looked_at_step(rows[last]);
+        }
         self.backend.run(&self.model.plan.watch, &rows[..1]);
-        let status = self.backend.uints(self.model.buffers.status);
-        self.alive()?;
+        self.backend.request(self.model.buffers.status);
+        let (looked, status) = if looks {
+            let [middle, after, status] = self.receive()?;
+            (Some(Looked { middle: middle.scalars(), after: after.scalars() }), status.uints())
+        } else {
+            let [status] = self.receive()?;
+            (None, status.uints())
+        };
         self.check_flags(&status)?;
+        if let Some(looked) = &looked {
+            self.judge(&looked.middle, &status);
+        }
         let before = std::mem::replace(&mut self.speed, f64::from(f32::from_bits(status[status::SPEED])));
         let travel = f64::from(f32::from_bits(status[status::TRAVEL]));
         let load = self.load();
@@ -64,15 +75,13 @@ impl Simulation {
         Ok(looked)
     }
 
-    /// Runs a step; returns its totals in the middle and after it.
-    pub(super) fn looked_at_step(&mut self, row: Row<f64>) -> Result<Looked> {
+    /// Runs a step, and asks for its totals in the middle and after it.
+    fn looked_at_step(&mut self, row: Row<f64>) {
         self.backend.run(&self.model.plan.step[..self.model.forces], &[row]);
-        let middle = self.diagnose(row)?;
+        self.diagnose(row);
         self.backend.run(&self.model.plan.step[self.model.forces..], &[row]);
         self.backend.run(&self.model.collect_motion, &[row]);
-        let after = self.backend.scalars(self.model.totals.buffer);
-        self.alive()?;
-        Ok(Looked { middle, after })
+        self.backend.request(self.model.totals.buffer);
     }
 
     /// Activates each prescribed motion when its time comes, by the masks of its nodes.

@@ -31,37 +31,34 @@ impl Simulation {
         Ok(())
     }
 
-    /// Runs the stages for energies and limits; returns the totals.
-    pub(super) fn diagnose(&mut self, row: Row<f64>) -> Result<Vec<f64>> {
+    /// Runs the stages for energies and limits, and asks for the totals.
+    pub(super) fn diagnose(&mut self, row: Row<f64>) {
         self.backend.run(&self.model.plan.diagnose, &[row]);
         self.backend.run(&self.model.plan.collect, &[row]);
+        self.backend.request(self.model.totals.buffer);
+    }
+
+    /// The health of the scene by its totals and status.
+    pub(super) fn judge(&mut self, totals: &[f64], status: &[u32]) {
         let places = &self.model.totals;
-        let totals = self.backend.scalars(places.buffer);
-        let status = self.backend.uints(self.model.buffers.status);
-        self.alive()?;
-        let (worst, node) = places.stiffness.of(&totals);
+        let (worst, node) = places.stiffness.of(totals);
         let contact = f64::from(f32::from_bits(status[status::CONTACT_RATE]));
         self.health.dt_limit = time_step::limit(worst + contact);
         self.health.limiting_node = node;
         (self.health.min_jacobian, self.health.worst_hex) = places.jacobian.map_or((1.0, 0), |largest| {
-            let (negative, place) = largest.of(&totals);
+            let (negative, place) = largest.of(totals);
             (-negative, self.model.hex_at[place])
         });
-        self.health.penetration = status::penetration(&status);
+        self.health.penetration = status::penetration(status);
         let steps = (self.step - self.diagnosed).max(1) as u32;
         self.diagnosed = self.step;
         self.health.touching = status::TOUCHING.map(|p| status[p] / steps);
         self.health.added_mass = std::array::from_fn(|kind| {
-            let by_contact = places.added[kind].map_or(0.0, |added| added.of(&totals, 0));
+            let by_contact = places.added[kind].map_or(0.0, |added| added.of(totals, 0));
             let [truly, floor] = self.model.whole_mass[kind];
             if truly > 0.0 { (floor + by_contact) / truly } else { 0.0 }
         });
-        let mut cleared = status;
-        for place in [status::CONTACT_RATE].into_iter().chain(status::PENETRATION).chain(status::TOUCHING) {
-            cleared[place] = 0;
-        }
-        self.backend.set_bytes(self.model.buffers.status, bytemuck::cast_slice(&cleared));
-        Ok(totals)
+        self.backend.clear_part(self.model.buffers.status, status::SINCE_LOOK);
     }
 
     pub(super) fn choose_dt(&mut self) {

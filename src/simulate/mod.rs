@@ -27,6 +27,7 @@ pub use stretch::Fibres;
 
 use crate::backend::Backend;
 use crate::error::{Error, Result};
+use crate::kernel::buffer::Contents;
 use crate::kernel::row::Row;
 use crate::mesh::Mesh;
 use crate::plan::{self, Capacity, Model};
@@ -248,6 +249,16 @@ impl Simulation {
         let at = |fault| format!("{fault}; noticed at step {} (t = {:.6e} s)", self.step, self.time);
         self.backend.fault().map_or(Ok(()), |fault| Err(Error::Device(at(fault))))
     }
+    /// What was asked for, from a backend that still computes.
+    ///
+    /// # Errors
+    /// The failure of a device.
+    fn receive<const N: usize>(&mut self) -> Result<[Contents; N]> {
+        let received = self.backend.receive();
+        self.alive()?;
+        Ok(received.try_into().expect("as many as were asked for"))
+    }
+
     /// Whether the schedule has come to its end.
     pub fn done(&self) -> bool {
         self.time >= self.schedule.end() * (1.0 - 1e-12)
@@ -307,7 +318,11 @@ impl Simulation {
         self.dt_before = self.dt;
         self.search_all()?;
         self.threads_at_rest();
-        let totals = self.diagnose(self.row(self.time, self.dt, self.dt_before))?;
+        self.diagnose(self.row(self.time, self.dt, self.dt_before));
+        self.backend.request(self.model.buffers.status);
+        let [totals, status] = self.receive()?;
+        let totals = totals.scalars();
+        self.judge(&totals, &status.uints());
         self.guard_step()?;
         self.choose_dt();
         self.dt_before = self.dt;

@@ -6,7 +6,6 @@ use crate::contact::threads::MOST_PAIRS;
 use crate::contact::{found, status};
 use crate::error::Result;
 use crate::kernel::buffer::Buffer;
-use crate::kernel::position::QUANTUM;
 use crate::plan::{self, Capacity};
 
 impl Simulation {
@@ -14,14 +13,11 @@ impl Simulation {
     pub(super) fn search_all(&mut self) -> Result<()> {
         let b = &self.model.buffers;
         if let Some(before) = b.before {
-            let now = self.backend.ints(b.quanta).into_iter().zip(self.backend.scalars(b.remainder));
-            let now: Vec<i32> =
-                now.map(|(quanta, rest)| quanta.wrapping_add((rest / QUANTUM).round() as i32)).collect();
-            self.backend.set_bytes(before, bytemuck::cast_slice(&now));
+            self.backend.copy(b.quanta, before);
         }
+        const { assert!(found::NEVER == 0) };
         for found in b.found.into_iter().flatten() {
-            let count = self.model.plan.buffers[found.0].len;
-            self.backend.set_bytes(found, bytemuck::cast_slice(&vec![found::NEVER; count]));
+            self.backend.clear(found);
         }
         self.search()?;
         self.searched = 0;
@@ -41,12 +37,13 @@ impl Simulation {
         for _ in 0..8 {
             let row = self.row(self.time, self.dt, self.dt_before);
             self.backend.run(&self.model.plan.search, &[row]);
-            let status = self.backend.uints(self.model.buffers.status);
-            self.alive()?;
+            self.backend.request(self.model.buffers.status);
+            let [status] = self.receive()?;
+            let status = status.uints();
+            self.check_flags(&status)?;
+            self.backend.clear_part(self.model.buffers.status, status::SINCE_SEARCH);
             let full = status[status::FLAGS] & (status::CELL_FULL | status::SLOTS_FULL);
-            self.clear_travel(&status);
             if full == 0 {
-                self.check_flags(&status)?;
                 self.searches += 1;
                 self.searched += u64::from(status[status::SEARCHED]);
                 return Ok(());
@@ -119,17 +116,6 @@ impl Simulation {
         let kind =
             b.faces.iter().position(|f| f.is_some_and(|f| [f.keys, f.touches, f.gaps].contains(&Buffer(buffer))));
         kind.map_or(self.scene.mesh.beams(), |kind| self.model.points[kind].len())
-    }
-
-    pub(super) fn clear_travel(&mut self, status: &[u32]) {
-        let mut bytes = bytemuck::cast_slice::<u32, u8>(status).to_vec();
-        for place in [status::FLAGS, status::TRAVEL, status::SPEED, status::SEARCHED] {
-            bytes[4 * place..][..4].fill(0);
-        }
-        // flags that stop the run stay
-        let stay = status[status::FLAGS] & !(status::CELL_FULL | status::SLOTS_FULL);
-        bytes[4 * status::FLAGS..][..4].copy_from_slice(&stay.to_ne_bytes());
-        self.backend.set_bytes(self.model.buffers.status, &bytes);
     }
 }
 

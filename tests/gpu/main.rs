@@ -7,3 +7,4 @@ mod cell;
 mod scenes;
 mod shaders;
 mod stages;
+mod traffic;

@@ -21,8 +21,8 @@ use tricot::plan::Model;
 use tricot::run;
 use tricot::simulate::{BackendConfig, Simulation};
 
-/// The adapter that all tests share.
-fn device() -> Option<Arc<Device>> {
+/// The adapter that tests share.
+pub(super) fn device() -> Option<Arc<Device>> {
     static DEVICE: OnceLock<Option<Arc<Device>>> = OnceLock::new();
     let open = || match Device::open("") {
         Ok(device) => Some(device),

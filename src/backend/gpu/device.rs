@@ -177,7 +177,7 @@ impl Device {
         });
         let device = Self { device, queue, listed, limits, row_layout, pipelines: Mutex::default(), faults };
         let device = Arc::new(device);
-        super::self_test(&device)?;
+        super::self_test::self_test(&device)?;
         Ok(device)
     }
 

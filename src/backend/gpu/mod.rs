@@ -1,41 +1,46 @@
 //! The GPU backend: the WGSL twins of the stages, through wgpu. Only this folder knows wgpu.
 //!
-//! Steps are recorded into one compute pass, with a dispatch for each stage and an offset into a buffer of rows for each step.
-//! They are submitted when something is read: a burst of steps, the check of the distance travelled and the copy of the status
-//! are one submission. Two dispatches may overlap if neither writes a buffer of the other.
+//! Steps are recorded into compute passes, with a dispatch for each stage and an offset into a buffer of rows for each step. A few
+//! steps are one submission, so that the device computes while the host records the next ones; no submission takes longer than
+//! drivers allow. The host waits only for numbers that it asked for, once for all of them: see [`readback`].
+//!
+//! Dispatches do not overlap: wgpu puts a barrier before each one that uses a buffer otherwise than the one before did.
 //!
 //! A device that fails stays failed: later reads return zeros, and [`Backend::fault`] says why.
 
+mod clock;
 mod device;
 mod pipeline;
 mod rates;
+mod readback;
+mod self_test;
 
 pub use device::{Device, devices};
 pub use rates::Rates;
 
-use super::Backend;
-use super::cpu::Cpu;
+use super::{Backend, Traffic};
 use crate::error::{Error, Result};
-use crate::kernel::buffer::{Array, Buffer, Description, Initial, Kind};
-use crate::kernel::exact::{self, Exact};
-use crate::kernel::lane::Isa;
+use crate::kernel::buffer::{Array, Buffer, Contents, Description, Initial, Kind};
 use crate::kernel::row::Row;
-use crate::kernel::stage::{Code, Stage, wires};
+use crate::kernel::stage::Stage;
+use clock::{Clock, Time};
 use pipeline::Bound;
+use readback::Staged;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::ops::Range;
 use std::sync::Arc;
+use std::time::Instant;
 use wgpu::util::DeviceExt as _;
 
 /// Rows that can be recorded before a submission.
 const ROWS: u64 = 512;
 /// Bytes from one row to the next: the largest alignment of offsets that adapters ask for.
 const ROW_STRIDE: u64 = 256;
-/// Calls of a list of stages between two that are timed.
-const TIMED_EVERY: u64 = 7;
-/// Stages of a timed call at most.
-const TIMED_STAGES: u32 = 64;
+/// Most steps in a submission, and its longest duration by the time of steps before, s: Windows resets a device after 2 s.
+const SUBMITTED: usize = 8;
+const LONGEST: f64 = 0.1;
 
 /// Buffers on a device, and work that waits to be submitted.
 pub struct Gpu {
@@ -51,30 +56,23 @@ pub struct Gpu {
     work: RefCell<Work>,
 }
 
-/// Commands recorded but not submitted, and measured times.
+/// Commands recorded but not submitted, and what was measured.
 struct Work {
     encoder: wgpu::CommandEncoder,
+    /// Whether anything is recorded.
+    recorded: bool,
     /// Rows written since the last submission.
     rows: u64,
     clock: Option<Clock>,
     times: Vec<Time>,
-}
-
-/// Timestamps of one timed call.
-struct Clock {
-    queries: wgpu::QuerySet,
-    resolved: wgpu::Buffer,
-    /// Stages with a timestamp before and after, not yet read.
-    waiting: Vec<&'static str>,
-}
-
-/// Time of a stage.
-struct Time {
-    stage: &'static str,
-    calls: u64,
-    runs: u64,
-    timed: u64,
-    timed_s: f64,
+    requested: Vec<Staged>,
+    /// Staging buffers that are not in use.
+    free: Vec<wgpu::Buffer>,
+    /// When the host last received numbers, the rows recorded since then, and the time of a row over the time before, s.
+    received: Instant,
+    since: u64,
+    pace: f64,
+    traffic: Traffic,
 }
 
 impl Gpu {
@@ -140,7 +138,19 @@ impl Gpu {
             row_group,
             bound: HashMap::new(),
             saved: Vec::new(),
-            work: RefCell::new(Work { encoder, rows: 0, clock, times: Vec::new() }),
+            work: RefCell::new(Work {
+                encoder,
+                recorded: false,
+                rows: 0,
+                clock,
+                times: Vec::new(),
+                requested: Vec::new(),
+                free: Vec::new(),
+                received: Instant::now(),
+                since: 0,
+                pace: LONGEST,
+                traffic: Traffic::default(),
+            }),
             device,
         })
     }
@@ -148,35 +158,16 @@ impl Gpu {
     /// Submits what is recorded.
     fn flush(&self) {
         let mut work = self.work.borrow_mut();
+        if !work.recorded {
+            return;
+        }
+        let started = Instant::now();
         let empty = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let recorded = std::mem::replace(&mut work.encoder, empty);
         self.device.queue.submit([recorded.finish()]);
-        work.rows = 0;
-    }
-
-    /// Copies `bytes` of a buffer to the host, after all that is recorded.
-    fn fetch(&self, from: &wgpu::Buffer, bytes: u64) -> Vec<u8> {
-        let gpu = &self.device.device;
-        let staging = gpu.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("staging"),
-            size: bytes.max(4),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        self.work.borrow_mut().encoder.copy_buffer_to_buffer(from, 0, &staging, 0, bytes);
-        self.flush();
-        staging.map_async(wgpu::MapMode::Read, .., |_| {});
-        if let Err(error) = gpu.poll(wgpu::PollType::wait_indefinitely()) {
-            self.device.note(&error.to_string());
-        }
-        match staging.slice(..).get_mapped_range() {
-            Ok(view) if self.device.fault().is_none() => view[..bytes as usize].to_vec(),
-            Ok(_) => vec![0; bytes as usize],
-            Err(error) => {
-                self.device.note(&error.to_string());
-                vec![0; bytes as usize]
-            }
-        }
+        (work.rows, work.recorded) = (0, false);
+        work.traffic.submissions += 1;
+        work.traffic.recording_s += started.elapsed().as_secs_f64();
     }
 
     fn numbers<T: bytemuck::Pod>(&self, buffer: Buffer) -> Vec<T> {
@@ -193,22 +184,16 @@ impl Gpu {
             pass.set_bind_group(2, &bound.constants, &[]);
             pass.dispatch_workgroups(bound.workgroups[0], bound.workgroups[1], 1);
         };
-        let Work { encoder, clock, .. } = work;
-        if let Some(clock) = clock.as_mut().filter(|_| timed && ready.len() <= TIMED_STAGES as usize) {
+        let Work { encoder, clock, traffic, .. } = work;
+        traffic.dispatches += (ready.len() * rows.len()) as u64;
+        if let Some(clock) = clock.as_mut().filter(|clock| timed && clock.takes(ready.len())) {
             for (i, (stage, bound)) in ready.iter().enumerate() {
-                let timestamp_writes = Some(wgpu::ComputePassTimestampWrites {
-                    query_set: &clock.queries,
-                    beginning_of_pass_write_index: Some(2 * i as u32),
-                    end_of_pass_write_index: Some(2 * i as u32 + 1),
-                });
-                let label = Some(stage.name);
+                let (label, timestamp_writes) = (Some(stage.name), Some(clock.around(i)));
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes });
                 pass.set_bind_group(0, &self.row_group, &[rows[0]]);
                 dispatch(&mut pass, bound);
-                drop(pass);
-                clock.waiting.push(stage.name);
             }
-            encoder.resolve_query_set(&clock.queries, 0..2 * ready.len() as u32, &clock.resolved, 0);
+            clock.resolve(encoder, ready.iter().map(|(stage, _)| stage.name));
             return;
         }
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
@@ -218,22 +203,19 @@ impl Gpu {
         }
     }
 
-    /// Reads the timestamps of the last timed call.
-    fn read_clock(&self) {
-        let resolved = match &self.work.borrow().clock {
-            Some(clock) if !clock.waiting.is_empty() => clock.resolved.clone(),
-            _ => return,
-        };
-        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&self.fetch(&resolved, resolved.size()));
-        let period = f64::from(self.device.queue.get_timestamp_period()) * 1e-9;
+    /// Whether a call of a list of stages, each run `rows` times, is timed.
+    fn counts(&self, stages: &[Stage], rows: u64) -> bool {
         let work = &mut *self.work.borrow_mut();
-        let waiting = work.clock.as_mut().map(|clock| std::mem::take(&mut clock.waiting)).unwrap_or_default();
-        for (stage, ticks) in waiting.into_iter().zip(ticks.chunks_exact(2)) {
-            if let Some(time) = work.times.iter_mut().find(|t| t.stage == stage) {
-                time.timed += 1;
-                time.timed_s += ticks[1].saturating_sub(ticks[0]) as f64 * period;
+        let mut timed = false;
+        for stage in stages.iter().filter(|s| s.count > 0) {
+            let known = work.times.iter().position(|t| t.stage == stage.name);
+            let place = known.unwrap_or(work.times.len());
+            if known.is_none() {
+                work.times.push(Time::new(stage.name));
             }
+            timed |= work.times[place].is_due(rows);
         }
+        timed
     }
 }
 
@@ -243,26 +225,6 @@ fn key(stage: &Stage) -> u64 {
     (stage.kernel.shader, stage.first, stage.count, &stage.reads, &stage.params).hash(&mut hasher);
     stage.writes.iter().for_each(|(buffer, _)| buffer.hash(&mut hasher));
     hasher.finish()
-}
-
-impl Clock {
-    fn new(gpu: &wgpu::Device) -> Self {
-        let count = 2 * TIMED_STAGES;
-        Self {
-            queries: gpu.create_query_set(&wgpu::QuerySetDescriptor {
-                label: Some("stages"),
-                ty: wgpu::QueryType::Timestamp,
-                count,
-            }),
-            resolved: gpu.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("times of stages"),
-                size: 8 * u64::from(count),
-                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
-                mapped_at_creation: false,
-            }),
-            waiting: Vec::new(),
-        }
-    }
 }
 
 impl Backend for Gpu {
@@ -275,38 +237,39 @@ impl Backend for Gpu {
                 }
             }
         }
-        self.read_clock();
-        for rows in rows.chunks(ROWS as usize) {
-            if self.work.borrow().rows + rows.len() as u64 > ROWS {
+        let timed = self.counts(stages, rows.len() as u64);
+        let (mut left, started) = (rows, Instant::now());
+        while !left.is_empty() {
+            let most = ((LONGEST / self.work.borrow().pace) as usize).clamp(1, SUBMITTED);
+            let (now, later) = left.split_at(most.min(left.len()));
+            left = later;
+            if self.work.borrow().rows + now.len() as u64 > ROWS {
                 self.flush();
             }
             let mut work = self.work.borrow_mut();
             let first = work.rows * ROW_STRIDE;
-            let mut bytes = vec![0u8; rows.len() * ROW_STRIDE as usize];
-            for (row, place) in rows.iter().zip(bytes.chunks_exact_mut(ROW_STRIDE as usize)) {
+            let mut bytes = vec![0u8; now.len() * ROW_STRIDE as usize];
+            for (row, place) in now.iter().zip(bytes.chunks_exact_mut(ROW_STRIDE as usize)) {
                 place[..size_of::<Row<f32>>()].copy_from_slice(bytemuck::bytes_of(&row.cast::<f32>()));
             }
             self.device.queue.write_buffer(&self.rows, first, &bytes);
-            work.rows += rows.len() as u64;
-            let offsets: Vec<u32> = (0..rows.len() as u64).map(|i| (first + i * ROW_STRIDE) as u32).collect();
-            let mut timed = false;
-            for stage in stages.iter().filter(|s| s.count > 0) {
-                let known = work.times.iter().position(|t| t.stage == stage.name);
-                let place = known.unwrap_or(work.times.len());
-                if known.is_none() {
-                    work.times.push(Time { stage: stage.name, calls: 0, runs: 0, timed: 0, timed_s: 0.0 });
-                }
-                let time = &mut work.times[place];
-                timed |= time.calls.is_multiple_of(TIMED_EVERY);
-                time.calls += 1;
-                time.runs += rows.len() as u64;
+            work.recorded = true;
+            work.rows += now.len() as u64;
+            work.since += now.len() as u64;
+            let offsets: Vec<u32> = (0..now.len() as u64).map(|i| (first + i * ROW_STRIDE) as u32).collect();
+            let (plain, last) = offsets.split_at(offsets.len() - usize::from(timed && left.is_empty()));
+            if !plain.is_empty() {
+                self.record(&mut work, stages, plain, false);
             }
-            let last = if timed { offsets.len() - 1 } else { offsets.len() };
-            self.record(&mut work, stages, &offsets[..last], false);
-            if timed {
-                self.record(&mut work, stages, &offsets[last..], true);
+            if !last.is_empty() {
+                self.record(&mut work, stages, last, true);
+            }
+            drop(work);
+            if !left.is_empty() {
+                self.flush();
             }
         }
+        self.work.borrow_mut().traffic.recording_s += started.elapsed().as_secs_f64();
     }
 
     fn scalars(&self, buffer: Buffer) -> Vec<f64> {
@@ -327,15 +290,36 @@ impl Backend for Gpu {
         self.set_bytes(buffer, bytemuck::cast_slice(&values));
     }
 
+    fn request(&mut self, buffer: Buffer) {
+        let staged = self.stage(buffer);
+        self.work.borrow_mut().requested.push(staged);
+    }
+
+    fn receive(&mut self) -> Vec<Contents> {
+        let requested = std::mem::take(&mut self.work.borrow_mut().requested);
+        let kinds: Vec<Kind> = requested.iter().map(Staged::kind).collect();
+        kinds.into_iter().zip(self.land(requested)).map(|(kind, bytes)| readback::contents(kind, &bytes)).collect()
+    }
+
+    fn copy(&mut self, from: Buffer, to: Buffer) {
+        let work = &mut *self.work.borrow_mut();
+        work.encoder.copy_buffer_to_buffer(&self.buffers[from.0], 0, &self.buffers[to.0], 0, None);
+        work.recorded = true;
+    }
+
     fn clear(&mut self, buffer: Buffer) {
-        self.work.borrow_mut().encoder.clear_buffer(&self.buffers[buffer.0], 0, None);
+        self.clear_part(buffer, 0..self.shapes[buffer.0].1);
+    }
+
+    fn clear_part(&mut self, buffer: Buffer, numbers: Range<usize>) {
+        let work = &mut *self.work.borrow_mut();
+        let (from, bytes) = (4 * numbers.start as u64, 4 * numbers.len() as u64);
+        work.encoder.clear_buffer(&self.buffers[buffer.0], from, Some(bytes));
+        work.recorded = true;
     }
 
     fn bytes(&self, buffer: Buffer) -> Vec<u8> {
-        match self.shapes[buffer.0].1 {
-            0 => Vec::new(),
-            len => self.fetch(&self.buffers[buffer.0], 4 * len as u64),
-        }
+        self.land(vec![self.stage(buffer)]).pop().unwrap_or_default()
     }
 
     fn set_bytes(&mut self, buffer: Buffer, bytes: &[u8]) {
@@ -358,6 +342,7 @@ impl Backend for Gpu {
         for (buffer, copy) in &self.saved {
             work.encoder.copy_buffer_to_buffer(&self.buffers[buffer.0], 0, copy, 0, None);
         }
+        work.recorded = true;
     }
 
     fn restore(&mut self) {
@@ -365,6 +350,7 @@ impl Backend for Gpu {
         for (buffer, copy) in &self.saved {
             work.encoder.copy_buffer_to_buffer(copy, 0, &self.buffers[buffer.0], 0, None);
         }
+        work.recorded = true;
     }
 
     fn fault(&self) -> Option<String> {
@@ -372,47 +358,16 @@ impl Backend for Gpu {
     }
 
     fn timings(&self) -> Vec<(&'static str, f64)> {
-        self.read_clock();
-        let work = self.work.borrow();
-        work.times.iter().map(|t| (t.stage, t.timed_s / t.timed.max(1) as f64 * t.runs as f64)).collect()
+        self.land(Vec::new());
+        self.work.borrow().times.iter().map(Time::whole).collect()
+    }
+
+    fn traffic(&self) -> Option<Traffic> {
+        Some(self.work.borrow().traffic)
     }
 
     fn describe(&self) -> String {
         let listed = self.device.listed();
         format!("gpu, {}, {}, f32", listed.name, listed.interface)
     }
-}
-
-/// Checks that the device computes integers and sums with remainders as the CPU does, bit by bit.
-fn self_test(device: &Arc<Device>) -> Result<()> {
-    const ITEMS: usize = 512;
-    let (starts, steps): (Vec<i32>, Vec<f64>) = (0..ITEMS).map(exact::start).unzip();
-    let description = |name, kind, len, initial| Description { name, kind, len, persistent: false, initial };
-    let buffers = [
-        description("increments", Kind::Scalar, ITEMS, Initial::Scalar(steps)),
-        description("quanta", Kind::Int, ITEMS, Initial::Int(starts)),
-        description("remainders", Kind::Scalar, ITEMS, Initial::Zero),
-        description("sum", Kind::Int, 1, Initial::Zero),
-    ];
-    let [increments, quanta, remainders, sum] = [0, 1, 2, 3].map(Buffer);
-    let wires = wires![increments, quanta, remainders, sum];
-    let stage = Stage::new("self-test", Code::of::<Exact>(), (ITEMS, ITEMS), &wires, [0u32; 0]);
-    let mut gpu = Gpu::new(Arc::clone(device), &buffers)?;
-    let mut cpu = Cpu::<f32>::new(&buffers, 1, Isa::Scalar);
-    let both: [&mut dyn Backend; 2] = [&mut gpu, &mut cpu];
-    let [ours, theirs] = both.map(|backend| {
-        backend.run(std::slice::from_ref(&stage), &[Row::default()]);
-        [quanta, remainders, sum].map(|buffer| backend.bytes(buffer))
-    });
-    if let Some(fault) = device.fault() {
-        return Err(Error::Device(fault));
-    }
-    if ours == theirs {
-        return Ok(());
-    }
-    Err(Error::Unsupported(format!(
-        "{} loses small steps of positions or sums of integers (its compiler re-associates sums): its results would be wrong; use another \
-         adapter or --backend cpu",
-        device.listed().name
-    )))
 }
