@@ -8,6 +8,11 @@
 //!
 //! diagonal 1/(β dt² k_s) + 1/m_s + 1/m_{s+1}, off-diagonal −d_s·d_{s+1}/m_{s+1}, right side −d_s·(a_{s+1} − a_s).
 //!
+//! A mass μ = β dt² k that only resisted the stretching of a segment would have the force −μ (d·(a_{s+1} − a_s) + u²/l) d, with u
+//! the relative velocity of its nodes across it. The second term is left out: with u from half a step before, it feeds energy
+//! into whipping threads. Without it, the added mass does work on fast zigzags of light nodes, and fine meshes need a margin
+//! between the step and the limit of the elements, as in [`crate::case::accuracy`].
+//!
 //! The fibre laws are logarithmic: at a stretch λ < 1 their stiffness is (1 − ln λ)/λ² times the stiffness at rest. k_s grows
 //! by λ⁻⁴, which is more.
 //!

@@ -98,9 +98,9 @@ fn the_page_is_whole_fetches_nothing_and_says_what_the_tables_say() {
     }
     assert_eq!(rows.last().unwrap()[0].parse::<f64>().unwrap(), 3.0);
 
-    // sizes before shear are those of the last row of the hold
+    // sizes before shear are those of the last row before it
     let yarns = Columns::read(&dir.join("yarns.csv")).unwrap();
-    let before = yarns.numbers("shear_angle_deg").iter().rposition(|angle| *angle == 0.0).unwrap();
+    let before = history.texts("phase").iter().position(|phase| *phase == "shear").unwrap() - 1;
     for column in ["warp_width_mm", "weft_gap_mm"] {
         let wanted = format!("{:.3} ±", yarns.numbers(column)[before]);
         assert!(page.contains(&wanted), "{column}: {wanted}");

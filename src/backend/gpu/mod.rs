@@ -161,13 +161,11 @@ impl Gpu {
         if !work.recorded {
             return;
         }
-        let started = Instant::now();
         let empty = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let recorded = std::mem::replace(&mut work.encoder, empty);
         self.device.queue.submit([recorded.finish()]);
         (work.rows, work.recorded) = (0, false);
         work.traffic.submissions += 1;
-        work.traffic.recording_s += started.elapsed().as_secs_f64();
     }
 
     fn numbers<T: bytemuck::Pod>(&self, buffer: Buffer) -> Vec<T> {

@@ -62,6 +62,7 @@ impl Gpu {
         if staged.is_empty() {
             return Vec::new();
         }
+        let started = Instant::now();
         self.flush();
         let waiting = Instant::now();
         staged.iter().for_each(|copy| copy.buffer.map_async(wgpu::MapMode::Read, .., |_| {}));
@@ -71,6 +72,7 @@ impl Gpu {
         let mut landed: Vec<Vec<u8>> = staged.iter().map(|copy| self.mapped(copy)).collect();
         let work = &mut *self.work.borrow_mut();
         work.traffic.waits += 1;
+        work.traffic.recording_s += (waiting - started).as_secs_f64();
         work.traffic.waiting_s += waiting.elapsed().as_secs_f64();
         work.traffic.bytes_read += staged.iter().map(|copy| copy.bytes).sum::<u64>();
         work.pace = work.received.elapsed().as_secs_f64() / work.since.max(1) as f64;
