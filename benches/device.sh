@@ -1,19 +1,20 @@
 #!/usr/bin/env bash
 # All that a machine with a GPU can tell, in about ten minutes: adapters, parity with the CPU, a table of steps for scenes of every
-# size, and the whole specimen pulled by 5 mm. Tables go to device.jsonl, a line per scene; the last lines say which goals are met.
+# size, and the whole specimen pulled by 5 mm. Tables go to results/device.jsonl, a line per scene; the last lines say which goals are met.
 #   benches/device.sh [PART OF AN ADAPTER'S NAME]        STEPS=64 and SCENES="2 4" make a short try of it
 set -euo pipefail
 cd "$(dirname "$0")/.."
 adapter=${1:-}
 steps=${STEPS:-2000}
 scenes=${SCENES:-2 4;6 12;14 28;30 60;cases/bias_extension_small.json;cases/bias_extension.json}
-tables=device.jsonl
+tables=results/device.jsonl
 
 cargo build --release
 cargo bench --bench device --no-run
 target/release/tricot devices
 TRICOT_REQUIRE_ADAPTER=1 cargo test --release --test gpu
 
+mkdir -p results
 : > "$tables"
 IFS=';' read -ra each <<< "$scenes"
 for scene in "${each[@]}"; do

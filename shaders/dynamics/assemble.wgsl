@@ -107,7 +107,6 @@ fn assemble(node: u32) {
 #endif
     var acting = mass[node];
 #if CONTACT
-    check_range(node, contact_stiffness[node]);
     let contact = f32(contact_stiffness[node]) * params.stiffness_quantum;
     contact_stiffness[node] = 0;
 #if MASS_ADDED

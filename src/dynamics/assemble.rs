@@ -31,8 +31,8 @@ pub const NONE: u32 = u32::MAX;
 /// Constants of nodal slots shared with the twins.
 pub const CONSTANTS: [Constant; 4] = constants![uint: SOLID, THREAD, BENT, NONE];
 
-/// Largest sum of contact forces or stiffness at a node, quanta. Every pair stays below an eighth of it, so that at least 24
-/// pairs must push beyond it at once for a sum to wrap unseen.
+/// Largest sum of contact forces at a node, quanta. Every pair stays below an eighth of it, so that at least 24 pairs must push
+/// beyond it at once for a sum to wrap unseen.
 const MOST_SUM: u32 = 1 << 30;
 
 /// Constants of the stage.
@@ -210,7 +210,6 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
         let mut contact = [zero; BLOCK];
         let touches = !is_zero(quanta);
         if touches {
-            Self::check_range(io, first, quanta);
             let quantum = real(params.stiffness_quantum);
             for i in 0..count {
                 contact[i] = R::from_i32(quanta[i]) * quantum;
