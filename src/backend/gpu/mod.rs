@@ -2,7 +2,7 @@
 //!
 //! Steps are recorded into compute passes, with a dispatch for each stage and an offset into a buffer of rows for each step. A few
 //! steps are one submission, so that the device computes while the host records the next ones; no submission takes longer than
-//! drivers allow. The host waits only for numbers that it asked for, once for all of them: see [`readback`].
+//! drivers allow. The host waits only for numbers that it asked for, once for all of them: see `readback`.
 //!
 //! Dispatches do not overlap: wgpu puts a barrier before each one that uses a buffer otherwise than the one before did.
 //!
