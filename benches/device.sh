@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# All that a machine with a GPU can tell, in about ten minutes: adapters, parity with the CPU, a table of steps for scenes of every
-# size, and the whole specimen pulled by 5 mm. Tables go to results/device.jsonl, a line per scene; the last lines say which goals are met.
+# All that a machine with a GPU can tell: adapters, parity with the CPU, a table of steps for scenes of every size, and the whole
+# specimen pulled by 5 mm. Tables go to results/device.jsonl, a line per scene; the last lines say which goals are met.
 #   benches/device.sh [PART OF AN ADAPTER'S NAME]        STEPS=64 and SCENES="2 4" make a short try of it
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -44,5 +44,6 @@ if [[ $scenes == *bias_extension.json* ]]; then
     started=$(date +%s)
     target/release/tricot run cases/bias_extension.json --backend gpu --adapter "$adapter" --force -o results/device \
         --set domain.specimen.displacement_mm=5 --set steps.2.move.time_s=13.3e-3
-    goal "whole specimen by 5 mm, s of wall time" $(($(date +%s) - started)) most 10
+    # its share of 60 s for the whole pull: 16.8 of 163.5 ms
+    goal "whole specimen by 5 mm, s of wall time" $(($(date +%s) - started)) most 6.2
 fi

@@ -17,7 +17,7 @@ pub enum Accuracy {
     /// The mesh of the paper (Zheng et al.), 480 beams in the shipped cell: `resolution.beams_per_lap` 60.
     Paper,
     /// For daily work, as in the shipped cell: steps up to 1.5 µs (`integration.dt_max_s` 1.5e-6) with elements made heavy enough
-    /// for them (`effects.contact_mass.least_limit_s` 2.3e-6). With 1.75e-6 and 2e-6, cells with slices of 0.17 to 0.20 mm exploded.
+    /// for them (`effects.contact_mass.least_limit_s` 2.3e-6). With 2e-6, cells with slices of 0.17 and 0.19 mm explode.
     Standard,
     /// For results: `resolution.beams_per_lap` 120, and the steps of `standard`.
     Engineering,
