@@ -48,18 +48,12 @@ fn main() {
     let (steps, wall) = (sheet.step() - before, started.elapsed().as_secs_f64());
     let (step, per_step) = (wall / steps as f64, |count: u64| count as f64 / steps as f64);
     println!("{:.1} µs a step, {:.2} million hexes a second, {steps} steps", 1e6 * step, 1e-6 * hexes as f64 / step);
-    let traffic = sheet.backend().traffic().unwrap_or_default();
+    let traffic = sheet.backend().traffic().unwrap_or_default() - asked;
     let searches = sheet.searches() - searches;
-    let dispatches = per_step(traffic.dispatches - asked.dispatches);
-    let [submissions, waits, found, bytes] = [
-        traffic.submissions - asked.submissions,
-        traffic.waits - asked.waits,
-        searches,
-        traffic.bytes_read - asked.bytes_read,
-    ]
-    .map(|count| 1e3 * per_step(count));
-    let [recording, waiting] = [traffic.recording_s - asked.recording_s, traffic.waiting_s - asked.waiting_s]
-        .map(|time| 1e6 * time / steps as f64);
+    let dispatches = per_step(traffic.dispatches);
+    let [submissions, waits, found, bytes] =
+        [traffic.submissions, traffic.waits, searches, traffic.bytes_read].map(|count| 1e3 * per_step(count));
+    let [recording, waiting] = [traffic.recording_s, traffic.waiting_s].map(|time| 1e6 * time / steps as f64);
     println!("host, µs a step: recording {recording:.1}, waiting {waiting:.1}; {dispatches:.1} dispatches a step");
     println!(
         "in 1,000 steps: {submissions:.0} submissions, {waits:.0} waits, {found:.0} searches, {:.2} MB read back",

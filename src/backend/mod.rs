@@ -11,7 +11,7 @@ pub mod gpu;
 use crate::kernel::buffer::{Buffer, Contents};
 use crate::kernel::row::Row;
 use crate::kernel::stage::Stage;
-use std::ops::Range;
+use std::ops::{Range, Sub};
 
 /// A machine that runs stages. Numbers cross to the host as f64, whatever the precision of the run.
 pub trait Backend {
@@ -69,4 +69,20 @@ pub struct Traffic {
     /// Time for recording and submitting, and for waiting, s.
     pub recording_s: f64,
     pub waiting_s: f64,
+}
+
+impl Sub for Traffic {
+    type Output = Self;
+
+    /// What was asked since an earlier state.
+    fn sub(self, earlier: Self) -> Self {
+        Self {
+            dispatches: self.dispatches - earlier.dispatches,
+            submissions: self.submissions - earlier.submissions,
+            waits: self.waits - earlier.waits,
+            bytes_read: self.bytes_read - earlier.bytes_read,
+            recording_s: self.recording_s - earlier.recording_s,
+            waiting_s: self.waiting_s - earlier.waiting_s,
+        }
+    }
 }

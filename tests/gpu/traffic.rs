@@ -23,15 +23,7 @@ fn spent(scene: &mut Simulation, until: f64) -> (Traffic, u64, u64) {
     let (before, steps, searches) = (scene.backend().traffic().unwrap(), scene.step(), scene.searches());
     scene.advance(until, |_| false).unwrap_or_else(|e| panic!("{e}"));
     let after = scene.backend().traffic().unwrap();
-    let traffic = Traffic {
-        dispatches: after.dispatches - before.dispatches,
-        submissions: after.submissions - before.submissions,
-        waits: after.waits - before.waits,
-        bytes_read: after.bytes_read - before.bytes_read,
-        recording_s: after.recording_s - before.recording_s,
-        waiting_s: after.waiting_s - before.waiting_s,
-    };
-    (traffic, scene.step() - steps, scene.searches() - searches)
+    (after - before, scene.step() - steps, scene.searches() - searches)
 }
 
 /// A body at rest needs one wait per window: energies before and after the motion, status and timestamps come back together.
