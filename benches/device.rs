@@ -62,20 +62,21 @@ fn main() {
 
     let rates = device.rates();
     println!("device at best: {:.0} GB/s, {:.0} GFLOP/s", 1e-9 * rates.bytes, 1e-9 * rates.operations);
-    println!("{:20} {:>12} {:>12} {:>12}", "stage", "µs a step", "floor, µs", "of floor");
+    println!("{:60} {:>12} {:>12} {:>12}", "dispatch", "µs a step", "floor, µs", "of floor");
     let plan = sheet.model.plan.clone();
     let (mut sum, mut stages) = (0.0, serde_json::Map::new());
     for (name, time) in sheet.backend().timings() {
         let old = timed.iter().find(|(n, _)| *n == name).map_or(0.0, |(_, t)| *t);
         let spent = (time - old) / steps as f64;
         sum += spent;
-        let of_step = plan.step.iter().filter(|s| s.name() == name && !s.items().is_empty());
+        let of_step =
+            plan.step.iter().filter(|s| name.split(" + ").any(|one| one == s.name()) && !s.items().is_empty());
         let floor = of_step.map(|s| floor(&sheet, s, rates.bytes, rates.operations)).fold(0.0, |a, b| a + b);
         // only the stages of every step have a lower bound
         let floor = (floor > 0.0).then_some(floor);
         let shown = floor.map(|floor| format!("{:12.2} {:10.0} %", 1e6 * floor, 100.0 * floor / spent));
-        println!("{name:20} {:12.2} {}", 1e6 * spent, shown.unwrap_or_default());
-        stages.insert(name.into(), json!({ "us": 1e6 * spent, "floor_us": floor.map(|floor| 1e6 * floor) }));
+        println!("{name:60} {:12.2} {}", 1e6 * spent, shown.unwrap_or_default());
+        stages.insert(name, json!({ "us": 1e6 * spent, "floor_us": floor.map(|floor| 1e6 * floor) }));
     }
     println!("between dispatches: {:.0} % of the step", 100.0 * (1.0 - sum / step));
     let adapter = device.listed();

@@ -120,7 +120,7 @@ fn report(cell: &mut Simulation, bare: f64) {
     let started = Instant::now();
     let steps = advance(cell, STEPS) as f64;
     let wall = started.elapsed().as_secs_f64() / steps;
-    let spent: Vec<(&str, f64)> = times(cell)
+    let spent: Vec<(String, f64)> = times(cell)
         .into_iter()
         .map(|(name, t)| {
             let earlier = before.iter().find(|(n, _)| *n == name).map_or(0.0, |(_, t)| *t);

@@ -7,6 +7,8 @@ fn is_finite(x: f32) -> bool {
 }
 
 #if STATUS
+#include "kernel/row"
+
 // Raises a shared maximum of non-negative numbers, stored as the bits of an f32.
 fn raise(place: u32, value: f32) {
     let bits = bitcast<u32>(value);
@@ -15,9 +17,14 @@ fn raise(place: u32, value: f32) {
     }
 }
 
+// The places of a step (NOW), of the step before (BEFORE) or of the next (NEXT).
+fn turn(which: u32) -> u32 {
+    return FASTEST + 2u * ((u32(row.turn) + which) % 3u);
+}
+
 // Largest speed of the nodes of yarns (0) or threads (1) in the last step, mm/s.
 fn speed_of(kind: u32) -> f32 {
-    return bitcast<f32>(atomicLoad(&status[FASTEST + kind]));
+    return bitcast<f32>(atomicLoad(&status[turn(BEFORE) + kind]));
 }
 #endif
 

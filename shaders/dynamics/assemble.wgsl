@@ -60,13 +60,6 @@ fn bend_at(slot: u32, k: u32) -> vec3<f32> {
 fn assemble(node: u32) {
     let plane = arrayLength(&mass);
     var force = vec3<f32>();
-#if CONTACT
-    if node == 0u {
-        // contact has read the speeds; integration finds those of this step
-        atomicStore(&status[FASTEST], 0u);
-        atomicStore(&status[FASTEST + 1u], 0u);
-    }
-#endif
     if node < params.first_thread {
         for (var k = 0u; k < SOLID; k++) {
             let slot = solid_slots[SOLID * node + k];

@@ -49,15 +49,15 @@ fn solution(i: u32, end: f32) -> f32 {
 }
 
 fn fibre_lines(number: u32, local: u32) {
-    let group = GROUP * (number / LANES);
-    let lane = number % LANES;
-    if lane >= groups[group + 1u] {
+    let line = LINE * number;
+    let first = lines[line];
+    let n = lines[line + 1u];
+    let kind = lines[line + 2u];
+    if kind == FREE {
         return;
     }
-    let n = groups[group + 2u];
-    let first = groups[group] + lane * n;
-    let closed = groups[group + 3u] == 1u;
-    let wrap = vec2<i32>(bitcast<i32>(groups[group + 4u]), bitcast<i32>(groups[group + 5u]));
+    let closed = kind == CLOSED;
+    let wrap = vec2<i32>(bitcast<i32>(lines[line + 3u]), bitcast<i32>(lines[line + 4u]));
     let last = n - 1u;
 
     for (var i = local; i < n; i += WORKGROUP) {

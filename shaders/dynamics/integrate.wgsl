@@ -48,6 +48,10 @@ fn integrate(node: u32) {
     let gravity = vec3<f32>(params.gravity_x, params.gravity_y, params.gravity_z);
     var fallen = 0.0;
 #endif
+    if node == 0u {
+        atomicStore(&status[turn(NEXT)], 0u);
+        atomicStore(&status[turn(NEXT) + 1u], 0u);
+    }
     var square = 0.0;
     for (var k = 0u; k < 3u; k++) {
         let at = node + k * plane;
@@ -87,7 +91,7 @@ fn integrate(node: u32) {
         remainder[at] = r;
         square = square + new_v * new_v;
     }
-    raise(FASTEST + select(1u, 0u, node < params.first_thread), sqrt(square));
+    raise(turn(NOW) + select(1u, 0u, node < params.first_thread), sqrt(square));
 #if DAMPING
     work[node] = work[node] + damped;
 #endif

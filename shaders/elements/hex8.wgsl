@@ -250,7 +250,6 @@ fn bound(number: u32) {
         let fibre = vec3<f32>(1.0 + here[0].x, here[1].x, here[2].x);
         let side = cross(inverse(h, point, 1u), inverse(h, point, 2u));
         let rest = side / dot(inverse(h, point, 0u), side);
-        var slopes = array<vec3<f32>, 8>();
         var left = array<f32, 8>();
         var sum = vec3<f32>();
         var sum_across = 0.0;
@@ -263,8 +262,6 @@ fn bound(number: u32) {
                 let sine = sine_between(rest, changes[edge], fibre);
                 sizes = vec2<f32>(fma(sine, abs(0.5 * (high.x - low.x)), abs(0.5 * (high.x + low.x))));
             }
-            slopes[2u * edge] = abs(low);
-            slopes[2u * edge + 1u] = abs(high);
             left[2u * edge] = sizes.x;
             left[2u * edge + 1u] = sizes.y;
             let w = vec2<f32>(weight(h, 2u * edge), weight(h, 2u * edge + 1u));
@@ -275,7 +272,9 @@ fn bound(number: u32) {
         let m = moduli(p, here);
         let volume_here = volume(h, point);
         for (var a = 0u; a < 8u; a++) {
-            let others = moduli_rows(m, slopes[a], length(slopes[a].yz), sum, sum_across);
+            // found again rather than kept: a GPU would keep an array of slopes in memory
+            let slope = abs(slope_at(h, point, a));
+            let others = moduli_rows(m, slope, length(slope.yz), sum, sum_across);
             let row = fma(factor * m.along * left[a], sum_left, others);
             rows[a] = fma(row, volume_here, rows[a]);
         }

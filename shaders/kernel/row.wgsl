@@ -31,6 +31,7 @@ struct Row {
     affine: f32,
     closing: f32,
     searched: f32,
+    turn: f32,
 }
 
 @group(0) @binding(0) var<uniform> row: Row;

@@ -1,5 +1,19 @@
-// The entry point of every stage: passes its items to the kernel. If one row of workgroups is not enough, they fill a plane.
+// Passes the items of a workgroup to the kernel.
 
+#if CHAIN
+// Those of its unit.
+fn stage(unit: u32, local: u32) {
+    let first = cuts[unit * LINKS + LINK];
+#if WORKGROUPS
+    KERNEL(first, local);
+#else
+    let end = cuts[(unit + 1u) * LINKS + LINK];
+    for (var item = first + local; item < end; item += WORKGROUP) {
+        KERNEL(item);
+    }
+#endif
+}
+#else
 struct Items {
     first: u32,
     count: u32,
@@ -7,13 +21,8 @@ struct Items {
 
 @group(2) @binding(0) var<uniform> items: Items;
 
-@compute @workgroup_size(WORKGROUP)
-fn main(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let group = workgroup.y * workgroups.x + workgroup.x;
+// Those of a range.
+fn stage(group: u32, local: u32) {
 #if WORKGROUPS
     if group < items.count * ITEM_SHARES {
         KERNEL(items.first * ITEM_SHARES + group, local);
@@ -25,3 +34,13 @@ fn main(
     }
 #endif
 }
+
+// Workgroups of the stage.
+fn stage_workgroups() -> u32 {
+#if WORKGROUPS
+    return items.count * ITEM_SHARES;
+#else
+    return (items.count * ITEM_SHARES + WORKGROUP - 1u) / WORKGROUP;
+#endif
+}
+#endif

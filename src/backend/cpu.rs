@@ -1,18 +1,24 @@
 //! The CPU backend: stages split into fixed chunks that rayon spreads over threads.
 //!
-//! Stages that do not wait for each other run as one parallel loop. Chunks write disjoint memory or add integers, so the result
-//! does not depend on the number of threads or on which thread takes a chunk.
+//! Stages that do not wait for each other run as one parallel loop, and so do the stages of a chain, one after another within each
+//! chunk of units. Chunks write disjoint memory or add integers, so the result does not depend on the number of threads or on
+//! which thread takes a chunk.
 
 use super::Backend;
 use crate::kernel::buffer::{Array, Buffer, Contents, Description, Kind};
 use crate::kernel::interface::{Access, Slot};
+use crate::kernel::io::{Binding, Io};
 use crate::kernel::lane::{Isa, Real};
 use crate::kernel::row::Row;
-use crate::kernel::stage::{Binding, Code, Io, Stage};
+
+use crate::kernel::stage::{Code, Cut, Order, Stage};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
+
+/// Units of a chain in a chunk.
+const UNITS: usize = 16;
 
 /// Buffers in host memory, and threads to work on them.
 pub struct Cpu<R: Real> {
@@ -72,7 +78,7 @@ impl<R: Precision> Cpu<R> {
     fn run_groups(groups: &[Group<R>], rows: &[Row<R>], parallel: bool) {
         for row in rows {
             for group in groups {
-                let work = |chunk: &Chunk| group.run(chunk, row);
+                let work = |chunk: &Vec<Piece>| group.run(chunk, row);
                 if parallel && group.chunks.len() > 1 {
                     group.chunks.par_iter().with_max_len(1).for_each(work);
                 } else {
@@ -83,10 +89,10 @@ impl<R: Precision> Cpu<R> {
     }
 }
 
-/// Stages that may run at the same time, cut into chunks.
+/// Stages that may run at the same time, cut into chunks of one or, in a chain, of all of them.
 struct Group<'a, R: Real> {
     stages: Vec<Bound<'a, R>>,
-    chunks: Vec<Chunk>,
+    chunks: Vec<Vec<Piece>>,
 }
 
 /// A stage with its buffers bound.
@@ -102,19 +108,47 @@ struct Bound<'a, R: Real> {
 unsafe impl<R: Real> Sync for Bound<'_, R> {}
 
 /// A range of items of one stage in a group.
-struct Chunk {
+struct Piece {
     stage: usize,
     items: Range<usize>,
 }
 
 impl<R: Real> Group<'_, R> {
-    fn run(&self, chunk: &Chunk, row: &Row<R>) {
-        let stage = &self.stages[chunk.stage];
-        let started = Instant::now();
-        let io =
-            Io { bindings: &stage.bindings, row, params: stage.params, isa: stage.isa, items: chunk.items.clone() };
-        (stage.function)(&io, chunk.items.clone());
-        stage.spent.fetch_add(started.elapsed().as_nanos() as u64, Ordering::Relaxed);
+    fn run(&self, chunk: &[Piece], row: &Row<R>) {
+        let mut started = Instant::now();
+        for Piece { stage, items } in chunk {
+            let stage = &self.stages[*stage];
+            let io = Io { bindings: &stage.bindings, row, params: stage.params, isa: stage.isa, items: items.clone() };
+            (stage.function)(&io, items.clone());
+            let ended = Instant::now();
+            stage.spent.fetch_add((ended - started).as_nanos() as u64, Ordering::Relaxed);
+            started = ended;
+        }
+    }
+
+    /// Adds the chunks of a stage, or its pieces to the chunks of its chain.
+    fn cut(&mut self, stage: &Stage) {
+        let number = self.stages.len() - 1;
+        let pieces: Vec<Range<usize>> = match &stage.cut {
+            Cut::Grain(grain) => {
+                let Range { start, end } = stage.items();
+                (start..end).step_by(*grain).map(|first| first..(first + grain).min(end)).collect()
+            }
+            Cut::Units(units) => {
+                let last = units.len() - 1;
+                (0..last).step_by(UNITS).map(|unit| units[unit]..units[last.min(unit + UNITS)]).collect()
+            }
+        };
+        let continues = number > 0 && stage.order == Order::Follows;
+        if !continues {
+            self.chunks.extend(pieces.iter().map(|_| Vec::new()));
+        }
+        let first = self.chunks.len() - pieces.len();
+        for (chunk, items) in self.chunks[first..].iter_mut().zip(pieces) {
+            if !items.is_empty() {
+                chunk.push(Piece { stage: number, items });
+            }
+        }
     }
 }
 
@@ -145,8 +179,15 @@ impl<R: Precision> Backend for Cpu<R> {
             reads.chain(writes).zip(slots).map(bind).collect()
         };
         let mut groups: Vec<Group<R>> = Vec::new();
+        let mut before: Option<&Stage> = None;
         for stage in stages.iter().filter(|stage| stage.count > 0) {
-            if stage.waits || groups.is_empty() {
+            let joins = match stage.order {
+                Order::Waits => false,
+                Order::Beside => before.is_some(),
+                Order::Follows => before.is_some_and(|before| stage.continues(before)),
+            };
+            before = Some(stage);
+            if !joins {
                 groups.push(Group { stages: Vec::new(), chunks: Vec::new() });
             }
             let group = groups.last_mut().expect("just pushed");
@@ -158,11 +199,7 @@ impl<R: Precision> Backend for Cpu<R> {
                 isa: self.isa,
                 spent: spent.expect("every stage has a timer"),
             });
-            let number = group.stages.len() - 1;
-            group.chunks.extend((stage.first..stage.first + stage.count).step_by(stage.grain).map(|first| Chunk {
-                stage: number,
-                items: first..(first + stage.grain).min(stage.first + stage.count),
-            }));
+            group.cut(stage);
         }
         match &self.pool {
             Some(pool) => pool.install(|| Self::run_groups(&groups, &rows, true)),
@@ -232,9 +269,12 @@ impl<R: Precision> Backend for Cpu<R> {
         }
     }
 
-    fn timings(&self) -> Vec<(&'static str, f64)> {
+    fn timings(&self) -> Vec<(String, f64)> {
         let threads = self.threads as f64;
-        self.spent.iter().map(|(name, ns)| (*name, ns.load(Ordering::Relaxed) as f64 * 1e-9 / threads)).collect()
+        self.spent
+            .iter()
+            .map(|(name, ns)| ((*name).to_owned(), ns.load(Ordering::Relaxed) as f64 * 1e-9 / threads))
+            .collect()
     }
 
     fn describe(&self) -> String {

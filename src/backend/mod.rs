@@ -47,8 +47,8 @@ pub trait Backend {
     fn fault(&self) -> Option<String> {
         None
     }
-    /// Seconds spent in each stage so far, by name, in the order of first use.
-    fn timings(&self) -> Vec<(&'static str, f64)>;
+    /// Seconds spent so far in each stage, or in stages that a device runs at once, by name in the order of first use.
+    fn timings(&self) -> Vec<(String, f64)>;
     /// What a device was asked to do so far.
     fn traffic(&self) -> Option<Traffic> {
         None

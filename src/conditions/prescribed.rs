@@ -3,10 +3,12 @@
 use crate::dynamics::integrate::factors;
 use crate::kernel::buffer::Kind::{Scalar, Uint};
 use crate::kernel::interface::{Slot, slot};
+use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position;
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel};
+
+use crate::kernel::stage::Kernel;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
@@ -51,7 +53,8 @@ impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { first_thread } = io.params();
         let (nodes, targets) = (io.uints(slot!(Self::SLOTS, "nodes")), io.scalars(slot!(Self::SLOTS, "targets")));
-        let (velocity, mass) = (io.scalars(slot!(Self::SLOTS, "velocity")), io.scalars(slot!(Self::SLOTS, "mass")));
+        let velocity = io.view::<L::Scalar>(slot!(Self::SLOTS, "velocity"));
+        let mass = io.scalars(slot!(Self::SLOTS, "mass"));
         let plane = mass.len();
         let mut acceleration = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "acceleration"));
         let mut inverse = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "inverse_mass"));
@@ -67,7 +70,8 @@ impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
                 if mask >> k & 1 == 0 {
                     continue;
                 }
-                let (place, v) = (node + k * plane, velocity[node + k * plane]);
+                let place = node + k * plane;
+                let v = velocity.get(place);
                 let force = acceleration.get(place) / inverse.get(node);
                 let target = targets[3 * item + k] * row.motion;
                 let a = (target - v * keep) / gain;

@@ -16,11 +16,13 @@ use super::surface::{self, CARRIED, FACE, POINT, Surface, entry, of_coded};
 use super::{EMPTY, Params, found, grid, of_key, status};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, constants, slot};
+use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel};
+
+use crate::kernel::stage::Kernel;
 use crate::kernel::vector::Vector;
 use std::ops::Range;
 use std::sync::atomic::Ordering;

@@ -11,11 +11,13 @@ use super::{Params, status};
 use crate::elements::beam2;
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, constants, joined, slot};
+use crate::kernel::io::{Io, Own, Scatter};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel, Own, Scatter};
+
+use crate::kernel::stage::Kernel;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 

@@ -1,8 +1,8 @@
 //! Contact state of a point against faces between steps: gaps to listed faces, touched bodies, and the touch of each.
 
 use super::EMPTY;
+use crate::kernel::io::Own;
 use crate::kernel::lane::Real;
-use crate::kernel::stage::Own;
 
 /// Numbers before the gaps of a point, mm: the least gap at the last evaluation of faces; the largest possible closure since
 /// then; the penetration, or an upper bound of it. Then the gap of every face of the list.

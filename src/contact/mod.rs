@@ -128,13 +128,22 @@ pub mod status {
     pub const TOUCHING: [usize; 3] = [8, 9, 10];
     /// A node whose contact force overflowed its integer.
     pub const CULPRIT: usize = 11;
-    /// Largest speed of a node of a yarn and of a thread in the last step, bits of an f32, mm/s.
-    pub const FASTEST: [usize; 2] = [12, 13];
+    /// Largest speed of a node of a yarn, and behind it of a thread, in a step; bits of an f32, mm/s. Steps take turns at three
+    /// places: a step reads that of the step before, raises its own, and clears that of the next.
+    pub const FASTEST: [usize; 3] = [12, 14, 16];
+    pub const NOW: usize = 0;
+    pub const NEXT: usize = 1;
+    pub const BEFORE: usize = 2;
+    /// The places of a step, of the next, or of the step before.
+    #[inline(always)]
+    pub fn turn(turn: i32, from: usize) -> usize {
+        FASTEST[(turn as usize + from) % FASTEST.len()]
+    }
     /// What counts from one search to the next, and from one look at energies to the next.
     pub const SINCE_SEARCH: Range<usize> = FLAGS..PENETRATION[0];
     pub const SINCE_LOOK: Range<usize> = PENETRATION[0]..CULPRIT;
     /// Size of the buffer.
-    pub const SIZE: usize = 16;
+    pub const SIZE: usize = 18;
 
     /// A cell of the grid is full.
     pub const CELL_FULL: u32 = 1;
@@ -148,9 +157,9 @@ pub mod status {
     pub const OUT_OF_RANGE: u32 = 16;
 
     /// Status constants shared with the twins; places that exist per kind are given for the first kind.
-    pub const CONSTANTS: [Constant; 14] = constants![
+    pub const CONSTANTS: [Constant; 17] = constants![
         uint: FLAGS, TRAVEL, PENETRATION = PENETRATION[0], CONTACT_RATE, TOUCHING = TOUCHING[0], SPEED, CULPRIT, SEARCHED,
-            FASTEST = FASTEST[0], CELL_FULL, SLOTS_FULL, FORCE_RANGE, NOT_FINITE, OUT_OF_RANGE
+            FASTEST = FASTEST[0], NOW, NEXT, BEFORE, CELL_FULL, SLOTS_FULL, FORCE_RANGE, NOT_FINITE, OUT_OF_RANGE
     ];
 }
 

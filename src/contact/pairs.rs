@@ -14,11 +14,13 @@ use super::{EMPTY, Params, found, key, of_key, shift, status};
 use crate::elements::beam2;
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Slot, joined, slot};
+use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel};
+
+use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{Vector, add, apply, sub};
 use std::ops::Range;
 use std::sync::atomic::Ordering;

@@ -18,13 +18,15 @@ use super::surface::{self, CARRIED, FACE, POINT, Surface, of_coded};
 use super::{EMPTY, Params, candidates, of_key, status, sums};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, constants, slot};
+use crate::kernel::io::{Io, read};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::position;
 use crate::kernel::row::Row;
 use crate::kernel::scratch;
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel, read};
+
+use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{fma, norm};
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
@@ -121,7 +123,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'a, R, FRICTI
         Self {
             params,
             row: io.row,
-            fastest: read(&flags[status::FASTEST[0]]),
+            fastest: read(&flags[status::turn(io.row.turn.to_i32(), status::BEFORE)]),
             elapsed: io.row.dt_mid + io.row.dt_mid - io.row.dt,
             surface: Surface {
                 faces: io.uints(slot!(&SLOTS, "faces")),

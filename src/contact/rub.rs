@@ -11,8 +11,8 @@ use super::penalty::{Step, Walk};
 use super::potential::Pushed;
 use super::sums::{SUM_DAMPING, SUM_FRICTION, SUM_RADIUS, SUM_SLIP};
 use super::{EMPTY, Params, status};
+use crate::kernel::io::raise;
 use crate::kernel::lane::Real;
-use crate::kernel::stage::raise;
 use crate::kernel::vector::{Vector, add, apply, dot, fma, norm, scale};
 
 /// Damping and friction force on a point, N, and row sums of the stiffness against a body, N/mm: of a feature that pushes, and of

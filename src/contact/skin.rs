@@ -23,11 +23,13 @@
 use super::status;
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, slot};
+use crate::kernel::io::{Io, raise};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
 use crate::kernel::position::{self, MOST_MM, difference, in_mm};
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel, raise};
+
+use crate::kernel::stage::Kernel;
 use crate::kernel::vector::dot;
 use std::ops::Range;
 use std::sync::atomic::Ordering;

@@ -3,9 +3,11 @@
 use super::sums::{SUM_SLIP, shared, sums};
 use crate::kernel::buffer::Kind::Scalar;
 use crate::kernel::interface::{Slot, slot};
+use crate::kernel::io::Io;
 use crate::kernel::lane::Lane;
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel};
+
+use crate::kernel::stage::Kernel;
 use std::ops::Range;
 
 /// Adds the slip of the last steps.

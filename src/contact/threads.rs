@@ -15,12 +15,14 @@ use super::{EMPTY, Params, is_in_range, of_key, slot_state, status};
 use crate::elements::beam2::{self, TABLE};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Slot, constants, joined, slot};
+use crate::kernel::io::{Io, raise, read};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
 use crate::kernel::position;
 use crate::kernel::row::Row;
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel, raise, read};
+
+use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{add, apply, dot, fma, norm, scale, sub};
 use std::ops::Range;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
@@ -149,7 +151,7 @@ impl<'a, R: Real, const FRICTION: bool, const PERIODIC: bool> Touch<'a, R, FRICT
         let params: Params = io.params();
         let thick = real::<R>(2.0 * params.thread_radius);
         let flags = io.atomic_uints(slot!(&FORCE, "status"));
-        let fastest: R = read(&flags[status::FASTEST[1]]);
+        let fastest: R = read(&flags[status::turn(io.row.turn.to_i32(), status::BEFORE) + 1]);
         Self {
             scene: Scene::new(io, &params),
             row: io.row,
@@ -338,6 +340,7 @@ impl<const FRICTION: bool, const PERIODIC: bool> Kernel for Force<FRICTION, PERI
             &sums::shared(FRICTION, PERIODIC),
             &constants![uint: SLOT_STATE = slot_state(FRICTION); scalar: LEAST, GAP_ROUNDING],
         ],
+        light: true,
         ..Shader::new("contact/threads", "force")
     };
     const SLOTS: &'static [Slot] = &FORCE;

@@ -4,11 +4,13 @@
 use super::{Params, add_pair, add_stiffness, status};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Slot, constants, slot};
+use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Displacements;
 use crate::kernel::position;
 use crate::kernel::shader::Shader;
-use crate::kernel::stage::{Io, Kernel};
+
+use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{dot, fma, scale};
 use std::ops::Range;
 
@@ -23,6 +25,7 @@ pub struct Tie;
 impl Kernel for Tie {
     const SHADER: Shader = Shader {
         constants: &[&position::CONSTANTS, &status::CONSTANTS, &super::CONSTANTS, &constants![uint: NODES, VALUES]],
+        light: true,
         ..Shader::new("contact/tie", "tie")
     };
     const SLOTS: &'static [Slot] = &[

@@ -9,13 +9,15 @@
 //! largest K/m of contact is reported for the choice of the time step.
 
 use super::BLOCK;
-use crate::contact::status::{self, CONTACT_RATE, FASTEST};
+use crate::contact::status::{self, CONTACT_RATE};
 use crate::elements::{self, LANES};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, constants, slot};
+use crate::kernel::io::{Io, raise};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel, raise};
+
+use crate::kernel::stage::Kernel;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 use std::sync::atomic::Ordering;
@@ -111,12 +113,6 @@ impl<const CONTACT: bool, const MASS_ADDED: bool, const BENDING: bool, const GRA
         let mut acceleration = io.own::<L::Scalar>(slot!(Self::SLOTS, "acceleration"));
         let mut inverse = io.own::<L::Scalar>(slot!(Self::SLOTS, "inverse_mass"));
         let zero = L::Scalar::from_f64(0.0);
-        if CONTACT && items.start == 0 {
-            // contact has read the speeds; integration finds those of this step
-            let status = io.atomic_uints(slot!(Self::SLOTS, "status", CONTACT));
-            status[FASTEST[0]].store(0, Ordering::Relaxed);
-            status[FASTEST[1]].store(0, Ordering::Relaxed);
-        }
         for first in items.clone().step_by(BLOCK) {
             let count = BLOCK.min(items.end - first);
             let mut force = [[zero; BLOCK]; 3];

@@ -4,11 +4,13 @@ use super::totals::{add_up, part};
 use crate::elements::beam2::{self, TABLE};
 use crate::kernel::buffer::Kind::{Int, Scalar};
 use crate::kernel::interface::{Slot, slot};
+use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
 use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, Share, when};
-use crate::kernel::stage::{Io, Kernel};
+
+use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{add, apply, dot};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;

@@ -16,42 +16,62 @@
 //! The fibre laws are logarithmic: at a stretch λ < 1 their stiffness is (1 − ln λ)/λ² times the stiffness at rest. k_s grows
 //! by λ⁻⁴, which is more.
 //!
-//! Segments are computed along each line, and the systems of up to sixteen lines are solved at once, one per lane: those of a
-//! group, or of consecutive groups of one line, such as threads. The WGSL twin gives each line a workgroup and solves the same
-//! system, bordered by its last row, by parallel cyclic reduction.
+//! Segments are computed along each line, and the systems of up to sixteen consecutive lines are solved at once, one per lane.
+//! The WGSL twin gives each line a workgroup and solves the same system, bordered by its last row, by parallel cyclic reduction.
+//!
+//! Every node belongs to one line, so that assembly, fibre lines and integration of a line need nothing from other lines. Nodes
+//! without fibres form free lines, which are left alone.
 
 use super::BLOCK;
 use super::tridiagonal::{BORDER, COUPLING, DIAGONAL, RIGHT, Systems};
-use crate::elements::{self, LANES};
+use crate::elements::LANES;
 use crate::kernel::buffer::CacheLine;
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Slot, constants, slot};
+use crate::kernel::io::{Io, Scatter, View};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::scratch;
 use crate::kernel::shader::{Shader, Share, when};
-use crate::kernel::stage::{Io, Kernel, Scatter};
+
+use crate::kernel::stage::Kernel;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
-/// A group of lines of equal length with consecutive nodes.
+/// A line of consecutive nodes.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
-pub struct Group {
-    /// First node of the first line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+pub struct Line {
+    /// First node.
     pub first: u32,
-    /// Number of lines, at most sixteen.
-    pub lines: u32,
-    /// Nodes per line, at least two.
+    /// Number of nodes; at least two unless it is free.
     pub stations: u32,
-    /// 1 if the first node follows the last, else 0.
-    pub closed: u32,
+    /// [`OPEN`], [`CLOSED`] or [`FREE`].
+    pub kind: u32,
     /// Image shift of the first node when it follows the last, in quanta along x and y.
     pub shift: [i32; 2],
 }
 
-/// Integers per group in the table.
-const GROUP: usize = size_of::<Group>() / 4;
+/// The ends are free, the first node follows the last, or no fibres connect the nodes.
+pub const OPEN: u32 = 0;
+pub const CLOSED: u32 = 1;
+pub const FREE: u32 = 2;
+
+/// Integers per line in the table.
+const LINE: usize = size_of::<Line>() / 4;
+
+impl Line {
+    /// Whether fibres run along it.
+    pub fn has_fibres(&self) -> bool {
+        self.kind != FREE
+    }
+
+    /// Nodes of the line.
+    pub fn nodes(&self) -> Range<usize> {
+        self.first as usize..(self.first + self.stations) as usize
+    }
+}
+
 /// Constants of the stage.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -61,7 +81,7 @@ pub struct Params {
 }
 
 const SLOTS: [Slot; 8] = [
-    Slot::read("groups", Uint),
+    Slot::read("lines", Uint),
     // axial stiffness at rest of the segment that starts at a node, N/mm; 0 for none
     Slot::read("stiffness", Scalar),
     Slot::read("reference", Int),
@@ -80,25 +100,25 @@ impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
     const SHADER: Shader = Shader {
         defines: &[when(PERIODIC, "PERIODIC")],
         // one workgroup per line
-        share: Share::Workgroups(LANES),
-        constants: &[&elements::CONSTANTS, &position::CONSTANTS, &constants![uint: GROUP]],
+        share: Share::Workgroups(1),
+        constants: &[&position::CONSTANTS, &constants![uint: LINE, CLOSED, FREE]],
         ..Shader::new("dynamics/fibre_lines", "fibre_lines")
     };
     const SLOTS: &'static [Slot] = &SLOTS;
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let groups: &[Group] = bytemuck::cast_slice(io.uints(slot!(&SLOTS, "groups")));
+        let table: &[Line] = bytemuck::cast_slice(io.uints(slot!(&SLOTS, "lines")));
         let nodes = Nodes::new(io);
         let mut correction = io.scatter(slot!(&SLOTS, "correction"));
         let mut block = Block::new();
         // of the systems and the directions of lines
         let mut memory = scratch::take::<Vec<CacheLine>>();
-        for item in items {
+        for first in items.clone().step_by(LANES) {
             let (mut lines, mut count) = ([Line::default(); LANES], 0);
-            for group in bundle(groups, item) {
-                for number in 0..group.lines as usize {
-                    lines[count] = group.line(number);
+            for line in &table[first..items.end.min(first + LANES)] {
+                if line.has_fibres() {
+                    lines[count] = *line;
                     count += 1;
                 }
             }
@@ -110,57 +130,13 @@ impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
     }
 }
 
-/// The groups that an item solves: its own or, if it is the first of up to sixteen consecutive groups of one line, all of these.
-#[inline(always)]
-fn bundle(groups: &[Group], item: usize) -> &[Group] {
-    if groups[item].lines > 1 {
-        return &groups[item..][..1];
-    }
-    if !item.is_multiple_of(LANES) && groups[item - 1].lines == 1 {
-        return &[];
-    }
-    let most = (LANES - item % LANES).min(groups.len() - item);
-    let mut count = 1;
-    while count < most && groups[item + count].lines == 1 {
-        count += 1;
-    }
-    &groups[item..][..count]
-}
-
-/// A line of consecutive nodes.
-#[derive(Clone, Copy, Default)]
-struct Line {
-    /// First node.
-    first: usize,
-    /// Number of nodes.
-    stations: usize,
-    /// Whether the first node follows the last, and its image shift then, in quanta.
-    closed: bool,
-    shift: [i32; 3],
-}
-
-impl Group {
-    /// A line of the group.
-    #[inline(always)]
-    fn line(&self, number: usize) -> Line {
-        let Self { first, stations, closed, shift, .. } = *self;
-        let stations = stations as usize;
-        Line {
-            first: first as usize + number * stations,
-            stations,
-            closed: closed == 1,
-            shift: [shift[0], shift[1], 0],
-        }
-    }
-}
-
 /// What is known of the nodes, and constants of the step.
 struct Nodes<'a, R> {
     reference: &'a [i32],
-    quanta: &'a [i32],
-    remainder: &'a [R],
-    acceleration: &'a [R],
-    inverse_mass: &'a [R],
+    quanta: View<'a, i32>,
+    remainder: View<'a, R>,
+    acceleration: View<'a, R>,
+    inverse_mass: View<'a, R>,
     stiffness: &'a [R],
     /// F̄ − I.
     gradient: &'a [[R; 3]; 3],
@@ -175,10 +151,10 @@ impl<'a, R: Real> Nodes<'a, R> {
         let beta = R::from_f64(f64::from(beta));
         Self {
             reference: io.ints(slot!(&SLOTS, "reference")),
-            quanta: io.ints(slot!(&SLOTS, "quanta")),
-            remainder: io.scalars(slot!(&SLOTS, "remainder")),
-            acceleration: io.scalars(slot!(&SLOTS, "acceleration")),
-            inverse_mass: io.scalars(slot!(&SLOTS, "inverse_mass")),
+            quanta: io.view(slot!(&SLOTS, "quanta")),
+            remainder: io.view(slot!(&SLOTS, "remainder")),
+            acceleration: io.view(slot!(&SLOTS, "acceleration")),
+            inverse_mass: io.view(slot!(&SLOTS, "inverse_mass")),
             stiffness: io.scalars(slot!(&SLOTS, "stiffness")),
             gradient: &io.row.gradient,
             compliance: R::from_f64(1.0) / (beta * io.row.dt * io.row.dt),
@@ -235,20 +211,20 @@ impl<R: Real> Block<R> {
             for i in 0..count {
                 rest[i] = R::from_i32(to[i].wrapping_sub(from[i]).wrapping_add(shift[k])) * quantum;
             }
-            let (from, to) = (&nodes.quanta[a..][..count], &nodes.quanta[b..][..count]);
-            let (from_rest, to_rest) = (&nodes.remainder[a..][..count], &nodes.remainder[b..][..count]);
+            let (from, to) = (nodes.quanta.slice(a, count), nodes.quanta.slice(b, count));
+            let (from_rest, to_rest) = (nodes.remainder.slice(a, count), nodes.remainder.slice(b, count));
             let moved = &mut self.moved[k][at..][..count];
             for i in 0..count {
                 moved[i] = position::difference(to[i], to_rest[i], from[i], from_rest[i]);
             }
-            let (from, to) = (&nodes.acceleration[a..][..count], &nodes.acceleration[b..][..count]);
+            let (from, to) = (nodes.acceleration.slice(a, count), nodes.acceleration.slice(b, count));
             let jump = &mut self.jump[k][at..][..count];
             for i in 0..count {
                 jump[i] = to[i] - from[i];
             }
         }
-        self.inverse_mass[0][at..][..count].copy_from_slice(&nodes.inverse_mass[start..][..count]);
-        self.inverse_mass[1][at..][..count].copy_from_slice(&nodes.inverse_mass[end..][..count]);
+        self.inverse_mass[0][at..][..count].copy_from_slice(nodes.inverse_mass.slice(start, count));
+        self.inverse_mass[1][at..][..count].copy_from_slice(nodes.inverse_mass.slice(end, count));
         self.stiffness[at..][..count].copy_from_slice(&nodes.stiffness[start..][..count]);
     }
 
@@ -315,8 +291,8 @@ fn solve<L: Lane, const PERIODIC: bool>(
 ) {
     let (mut counts, mut longest) = ([0; LANES], 0);
     for (count, line) in counts.iter_mut().zip(lines) {
-        *count = line.stations;
-        longest = longest.max(line.stations);
+        *count = line.nodes().len();
+        longest = longest.max(*count);
     }
     let space = Systems::space::<L>(lines.len(), longest);
     let numbers = space + longest + 3 * longest * lines.len();
@@ -331,7 +307,7 @@ fn solve<L: Lane, const PERIODIC: bool>(
     }
     systems.solve::<L>();
     for (lane, line) in lines.iter().enumerate() {
-        let unknowns = &mut unknowns[..line.stations];
+        let unknowns = &mut unknowns[..line.nodes().len()];
         systems.solution(lane, unknowns);
         correct(nodes, line, &directions[3 * longest * lane..][..3 * longest], unknowns, correction);
     }
@@ -347,10 +323,11 @@ fn set_up<L: Lane, const PERIODIC: bool>(
     systems: &mut Systems<L::Scalar>,
     lane: usize,
 ) {
-    let &Line { first, stations, closed, shift } = line;
+    let (first, stations, closed) = (line.first as usize, line.stations as usize, line.kind == CLOSED);
     let (last, plane) = (stations - 1, directions.len() / 3);
     // an open line has no last segment: any other segment of nonzero length takes its place
-    let (follower, shift) = if closed { (first, shift) } else { (first + last - 1, [0; 3]) };
+    let [x, y] = line.shift;
+    let (follower, shift) = if closed { (first, [x, y, 0]) } else { (first + last - 1, [0; 3]) };
     for at in (0..stations).step_by(BLOCK) {
         let count = BLOCK.min(stations - at);
         let inner = count.min(last - at);
@@ -372,7 +349,7 @@ fn set_up<L: Lane, const PERIODIC: bool>(
     let (zero, one) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(1.0));
     if closed {
         let [a, b] = [last, 0].map(|i| [directions[i], directions[plane + i], directions[2 * plane + i]]);
-        systems.set(lane, BORDER, 0, &[-(dot(a, b) * nodes.inverse_mass[first])]);
+        systems.set(lane, BORDER, 0, &[-(dot(a, b) * nodes.inverse_mass.get(first))]);
     } else {
         systems.set(lane, BORDER, 0, &[zero]);
         systems.set(lane, DIAGONAL, last, &[one]);
@@ -384,13 +361,13 @@ fn set_up<L: Lane, const PERIODIC: bool>(
 /// Writes the corrections of a line's nodes.
 #[inline(always)]
 fn correct<R: Real>(nodes: &Nodes<R>, line: &Line, directions: &[R], unknowns: &[R], correction: &mut Scatter<R>) {
-    let n = line.stations;
+    let (first, n) = (line.first as usize, line.stations as usize);
     let (last, plane) = (n - 1, directions.len() / 3);
-    let inverse_mass = &nodes.inverse_mass[line.first..][..n];
+    let inverse_mass = nodes.inverse_mass.slice(first, n);
     let p = &unknowns[..n];
     for k in 0..3 {
         let d = &directions[k * plane..][..n];
-        let to = correction.slice(line.first + k * nodes.inverse_mass.len(), n);
+        let to = correction.slice(first + k * nodes.inverse_mass.len(), n);
         to[0] = (p[last] * d[last] - p[0] * d[0]) * inverse_mass[0];
         for i in 1..n {
             to[i] = (p[i - 1] * d[i - 1] - p[i] * d[i]) * inverse_mass[i];

@@ -8,12 +8,15 @@ use super::BLOCK;
 use crate::contact::status;
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Slot, constants, slot};
+use crate::kernel::io::{Io, raise};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::{self, carry};
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel, raise};
+
+use crate::kernel::stage::Kernel;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
+use std::sync::atomic::Ordering;
 
 /// Constants of the stage.
 #[repr(C)]
@@ -121,12 +124,12 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
         let works = Self::WORKS;
         let [damped_plane, inertia_plane, fallen_plane] = works.planes();
         let params: Params = io.params();
-        let acceleration = io.scalars(slot!(Self::SLOTS, "acceleration"));
+        let acceleration = io.view::<L::Scalar>(slot!(Self::SLOTS, "acceleration"));
         let plane = acceleration.len() / 3;
         let masses =
             if works.count() > 0 { io.scalars(slot!(Self::SLOTS, "mass", Self::WORKS.count() > 0)) } else { &[] };
-        let inverse = if MASS_ADDED { io.scalars(slot!(Self::SLOTS, "inverse_mass", MASS_ADDED)) } else { &[] };
-        let correction = if LINES { io.scalars(slot!(Self::SLOTS, "correction", LINES)) } else { &[] };
+        let inverse = MASS_ADDED.then(|| io.view::<L::Scalar>(slot!(Self::SLOTS, "inverse_mass", MASS_ADDED)));
+        let correction = LINES.then(|| io.view::<L::Scalar>(slot!(Self::SLOTS, "correction", LINES)));
         let true_masses = if GRAVITY { io.scalars(slot!(Self::SLOTS, "true_mass", GRAVITY)) } else { &[] };
         let mut velocity = io.own::<L::Scalar>(slot!(Self::SLOTS, "velocity"));
         let mut quanta = io.own::<i32>(slot!(Self::SLOTS, "quanta"));
@@ -139,6 +142,11 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
         let solids = items.start..items.end.min(border);
         let threads = items.start.max(border)..items.end;
         let status = io.atomic_uints(slot!(Self::SLOTS, "status"));
+        let [own, next] = [status::NOW, status::NEXT].map(|from| status::turn(row.turn.to_i32(), from));
+        if items.start == 0 {
+            status[next].store(0, Ordering::Relaxed);
+            status[next + 1].store(0, Ordering::Relaxed);
+        }
         for kind in 0..2 {
             let (nodes, damping) =
                 if kind == 0 { (&solids, row.damping_solid) } else { (&threads, row.damping_thread) };
@@ -151,14 +159,17 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
                 // effective mass beyond the nodal mass, and works summed over the axes
                 let [mut extra, mut damped, mut inertia, mut fallen] = [[zero; BLOCK]; 4];
                 let mut squares = [zero; BLOCK];
-                if MASS_ADDED {
-                    for ((extra, inverse), mass) in extra.iter_mut().zip(&inverse[first..][..count]).zip(mass) {
+                if let Some(inverse) = &inverse {
+                    for ((extra, inverse), mass) in extra.iter_mut().zip(inverse.slice(first, count)).zip(mass) {
                         *extra = if *inverse == zero { zero } else { L::Scalar::from_f64(1.0) / *inverse - *mass };
                     }
                 }
                 for k in 0..3 {
-                    let a = &acceleration[first + k * plane..][..count];
-                    let correction = if LINES { &correction[first + k * plane..][..count] } else { &[] };
+                    let a = acceleration.slice(first + k * plane, count);
+                    let correction = match &correction {
+                        Some(correction) => correction.slice(first + k * plane, count),
+                        None => &[],
+                    };
                     let gravity = L::Scalar::from_f64(f64::from(params.gravity[k]));
                     let (v, q) = (velocity.slice(k, first, count), quanta.slice(k, first, count));
                     let r = remainder.slice(k, first, count);
@@ -204,7 +215,7 @@ impl<const LINES: bool, const GRAVITY: bool, const DAMPING: bool, const MASS_ADD
                     }
                 }
             }
-            raise(&status[status::FASTEST[kind]], fastest.sqrt());
+            raise(&status[own + kind], fastest.sqrt());
         }
     }
 }

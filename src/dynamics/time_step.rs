@@ -24,9 +24,11 @@ use crate::elements::beam2::{self, TABLE};
 use crate::elements::bend::{self, BEND};
 use crate::kernel::buffer::Kind::{Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, constants, joined, slot};
+use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel};
+
+use crate::kernel::stage::Kernel;
 use crate::kernel::vector::norm;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;

@@ -7,9 +7,11 @@
 use crate::elements::{self, LANES};
 use crate::kernel::buffer::Kind::{Scalar, Uint};
 use crate::kernel::interface::{Slot, constants, slot};
+use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::shader::{Shader, Share, WORKGROUP, when};
-use crate::kernel::stage::{Io, Kernel};
+
+use crate::kernel::stage::Kernel;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 

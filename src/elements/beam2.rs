@@ -5,11 +5,13 @@
 
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, constants, slot};
+use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Displacements;
 use crate::kernel::position;
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel};
+
+use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{add, apply, dot, norm, scale};
 use std::ops::Range;
 
@@ -52,6 +54,7 @@ impl<const PERIODIC: bool, const THERMAL: bool> Kernel for Beam2<PERIODIC, THERM
     const SHADER: Shader = Shader {
         defines: &[when(PERIODIC, "PERIODIC"), when(THERMAL, "THERMAL")],
         constants: &[&position::CONSTANTS, &CONSTANTS],
+        light: true,
         ..Shader::new("elements/beam2", "force")
     };
     const SLOTS: &'static [Slot] = &[

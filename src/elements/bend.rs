@@ -7,11 +7,13 @@
 use super::beam2::{self, TABLE, add_virial, vector};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, constants, slot};
+use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Displacements;
 use crate::kernel::position;
 use crate::kernel::shader::{Shader, when};
-use crate::kernel::stage::{Io, Kernel};
+
+use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{add, cross, dot, norm, scale, sub};
 use std::ops::Range;
 
@@ -35,6 +37,7 @@ impl<const PERIODIC: bool> Kernel for Bend<PERIODIC> {
     const SHADER: Shader = Shader {
         defines: &[when(PERIODIC, "PERIODIC")],
         constants: &[&position::CONSTANTS, &beam2::CONSTANTS, &CONSTANTS],
+        light: true,
         ..Shader::new("elements/bend", "force")
     };
     const SLOTS: &'static [Slot] = &[

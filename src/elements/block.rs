@@ -7,11 +7,11 @@
 use super::LANES;
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, constants, joined, slot};
+use crate::kernel::io::{Io, Own};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::math;
 use crate::kernel::position::{self, difference};
 use crate::kernel::shader::{Shader, Share, when};
-use crate::kernel::stage::{Io, Own};
 use crate::materials::{self, Material, PARAMETERS, Tensor};
 use bytemuck::{Pod, Zeroable};
 use std::marker::PhantomData;

@@ -20,9 +20,11 @@ use super::block::{
     weighed_shader,
 };
 use crate::kernel::interface::{Constant, Slot, constants, slot};
+use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real, Work};
 use crate::kernel::shader::Shader;
-use crate::kernel::stage::{Io, Kernel};
+
+use crate::kernel::stage::Kernel;
 use crate::materials::{Material, Tensor, jacobian};
 use std::marker::PhantomData;
 use std::ops::Range;

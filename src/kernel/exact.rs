@@ -4,10 +4,12 @@
 
 use super::buffer::Kind::{Int, Scalar, Uint};
 use super::interface::{Slot, constants, slot};
+use super::io::Io;
 use super::lane::{Lane, Real};
 use super::position::{self, QUANTUM, carry, quanta};
 use super::shader::{Shader, Share, WORKGROUP};
-use super::stage::{Io, Kernel};
+
+use super::stage::Kernel;
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 

@@ -88,18 +88,22 @@ impl Slot {
         }
     }
 
-    /// The declaration of the variable in the twin.
-    pub(super) fn declaration(&self, number: usize) -> String {
-        let Self { name, kind, access, .. } = self;
-        let scalar = match kind {
-            Kind::Scalar => "f32",
-            Kind::Int => "i32",
-            Kind::Uint => "u32",
-        };
-        let element = if *access == Some(Access::Atomic) { format!("atomic<{scalar}>") } else { scalar.to_owned() };
-        let mode = if access.is_some() { "read_write" } else { "read" };
-        format!("@group(1) @binding({number}) var<storage, {mode}> {name}: array<{element}>;")
+    /// Whether the twin declares the buffer as atomic integers.
+    pub(super) fn is_atomic(&self) -> bool {
+        self.access == Some(Access::Atomic)
     }
+}
+
+/// The declaration of a buffer in a twin.
+pub(super) fn declaration(name: &str, kind: Kind, atomic: bool, written: bool, number: usize) -> String {
+    let scalar = match kind {
+        Kind::Scalar => "f32",
+        Kind::Int => "i32",
+        Kind::Uint => "u32",
+    };
+    let element = if atomic { format!("atomic<{scalar}>") } else { scalar.to_owned() };
+    let mode = if written { "read_write" } else { "read" };
+    format!("@group(1) @binding({number}) var<storage, {mode}> {name}: array<{element}>;")
 }
 
 /// Number of a slot among the active ones; compilation fails if the slot is not active.
@@ -242,9 +246,11 @@ mod tests {
 
     #[test]
     fn declarations_are_wgsl() {
+        let declared =
+            |slot: Slot, number| declaration(slot.name, slot.kind, slot.is_atomic(), slot.access.is_some(), number);
         let [mass, _, force] = slots(true);
-        assert_eq!(mass.declaration(0), "@group(1) @binding(0) var<storage, read> mass: array<f32>;");
-        assert_eq!(force.declaration(1), "@group(1) @binding(1) var<storage, read_write> force: array<atomic<i32>>;");
+        assert_eq!(declared(mass, 0), "@group(1) @binding(0) var<storage, read> mass: array<f32>;");
+        assert_eq!(declared(force, 1), "@group(1) @binding(1) var<storage, read_write> force: array<atomic<i32>>;");
         const TIE: f64 = 1e-4;
         const NONE: u32 = u32::MAX;
         let [none, kind, tie] = constants![uint: NONE, KIND = 1; scalar: TIE];

@@ -2,8 +2,10 @@
 //! A kernel is written once over [`lane::Lane`] and runs as f32 or f64, one item or a whole register at a time.
 
 pub mod buffer;
+pub mod dispatch;
 pub mod exact;
 pub mod interface;
+pub mod io;
 pub mod lane;
 pub mod math;
 pub mod node;

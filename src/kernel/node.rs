@@ -1,8 +1,8 @@
 //! Access to nodal state: three planes (x, y, z) per buffer.
 
+use super::io::Io;
 use super::lane::Real;
 use super::position::{QUANTUM, difference};
-use super::stage::Io;
 use super::vector::Vector;
 
 /// Three planes of a buffer. They have the same length, so one bounds check of a node index serves all three.

@@ -35,6 +35,8 @@ pub struct Row<R> {
     pub closing: R,
     /// Zero if contact has surely not been searched since the previous step, else one.
     pub searched: R,
+    /// Number of the step modulo three, for the places of what one step leaves to the next.
+    pub turn: R,
 }
 
 impl Row<f64> {
@@ -56,6 +58,7 @@ impl Row<f64> {
             affine: r(self.affine),
             closing: r(self.closing),
             searched: r(self.searched),
+            turn: r(self.turn),
         }
     }
 }

@@ -3,8 +3,8 @@
 //! A twin has the path and the function names of its Rust file and repeats the same statements for one item. A kernel is a
 //! function of an item number (or of the share of an item, if several invocations work on it), or of a share and the invocation
 //! number if a workgroup works on it. Its text starts with the constants and bindings that Rust declares for it (see
-//! [`super::interface`]; only the constants that it uses), and ends with the entry point, `kernel/stage`, which calls it. Lines
-//! that begin with `#` direct the composition:
+//! [`super::interface`]; only the constants that it uses), and ends with `kernel/stage`, which passes the items of a workgroup
+//! to it. [`super::dispatch`] adds the entry point. Lines that begin with `#` direct the composition:
 //!
 //! - `#include "kernel/math"` inserts a file at its first occurrence; `#include LAW` inserts the file of the material law of
 //!   the stage,
@@ -15,6 +15,7 @@
 //! Every line of the text records its source file and line. Group 0 holds the row of the step, group 1 the buffers of the stage
 //! at the slot numbers of the kernel, group 2 the range of items and the parameters of the stage.
 
+use super::dispatch::Dispatch;
 use super::interface::Constant;
 use super::stage::Stage;
 use crate::error::{Error, Result};
@@ -24,8 +25,9 @@ use std::fmt::Write as _;
 
 static SHADERS: Dir = include_dir!("$CARGO_MANIFEST_DIR/shaders");
 
-/// The file with the entry point, and the name of the entry point.
+/// The file that passes items to the kernel, the file of the row, and the name of the entry point.
 const STAGE: &str = "kernel/stage";
+const ROW: &str = "kernel/row";
 pub const ENTRY: &str = "main";
 
 /// Invocations per workgroup.
@@ -44,6 +46,8 @@ pub struct Shader {
     pub law: Option<&'static str>,
     /// Invocations or workgroups per item.
     pub share: Share,
+    /// Whether its text is short and needs few registers, so that it may share a dispatch with stages beside it.
+    pub light: bool,
     /// Constants available to its files, module by module.
     pub constants: &'static [&'static [Constant]],
 }
@@ -70,7 +74,7 @@ impl Share {
 impl Shader {
     /// One invocation per item, no names defined.
     pub const fn new(file: &'static str, kernel: &'static str) -> Self {
-        Self { file, kernel, defines: &[], law: None, share: Share::Invocations(1), constants: &[] }
+        Self { file, kernel, defines: &[], law: None, share: Share::Invocations(1), light: false, constants: &[] }
     }
 }
 
@@ -80,7 +84,7 @@ pub const fn when(flag: bool, name: &'static str) -> &'static str {
 }
 
 /// The text of a stage's shader, and the origin of its lines.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Text {
     pub text: String,
     /// Source file and line of every line.
@@ -96,42 +100,60 @@ struct Composer {
 }
 
 impl Text {
-    /// The text of a stage.
+    /// The text of a stage that has a dispatch of its own.
     ///
     /// # Errors
     /// A missing file, or an invalid directive, with its file and line.
     pub fn of(stage: &Stage) -> Result<Self> {
+        Dispatch::alone(stage).text()
+    }
+
+    /// The row of the step for stages with these names defined.
+    pub(super) fn row(shader: Shader, defined: &[&'static str]) -> Result<Self> {
+        let mut composer = Composer { shader, text: Self::default(), included: Vec::new(), defined: defined.to_vec() };
+        composer.include(ROW)?;
+        Ok(composer.text)
+    }
+
+    /// The constants and functions of a stage, without bindings of buffers and without the row. A link of a chain has its
+    /// number, and the number of links.
+    pub(super) fn part(stage: &Stage, link: Option<[usize; 2]>) -> Result<Self> {
         let shader = stage.kernel.shader;
         let (shares, of_workgroups): (_, &[_]) = match shader.share {
             Share::Invocations(count) => (count, &[]),
             Share::Workgroups(count) => (count, &["WORKGROUPS"]),
         };
+        let of_chain: &[_] = if link.is_some() { &["CHAIN"] } else { &[] };
         let mut composer = Composer {
             shader,
-            text: Self { text: String::new(), lines: Vec::new() },
-            included: Vec::new(),
-            defined: [&[shader.kernel], of_workgroups, shader.defines].concat(),
+            text: Self::default(),
+            included: vec![ROW],
+            defined: [&[shader.kernel], of_workgroups, of_chain, shader.defines].concat(),
         };
         composer.include(shader.file)?;
         composer.include(STAGE)?;
-        let mut text = Self { text: String::new(), lines: Vec::new() };
+        let mut text = Self::default();
         let of_stage =
             [("WORKGROUP", WORKGROUP), ("ITEM_SHARES", shares)].into_iter().chain(stage.constants.iter().copied());
-        let of_stage = of_stage.map(|(name, value)| Constant::uint(name, value));
+        let of_link = link.map_or(Vec::new(), |[link, links]| vec![("LINK", link), ("LINKS", links)]);
+        let of_stage = of_stage.chain(of_link).map(|(name, value)| Constant::uint(name, value));
         let of_files = shader.constants.iter().copied().flatten().copied();
         let words = composer.text.words();
         for constant in of_stage.chain(of_files).filter(|constant| words.contains(constant.name)) {
             text.push(&constant.declaration(), ("constants from Rust", 0));
         }
-        for (number, slot) in stage.kernel.slots.iter().filter(|slot| slot.there).enumerate() {
-            text.push(&slot.declaration(number), ("slots of the kernel", 0));
-        }
-        text.text.push_str(&composer.text.text);
-        text.lines.extend(composer.text.lines);
+        text.append(composer.text);
         Ok(text)
     }
 
-    fn push(&mut self, line: &str, from: (&'static str, usize)) {
+    /// Adds another text.
+    pub(super) fn append(&mut self, other: Self) {
+        self.text.push_str(&other.text);
+        self.lines.extend(other.lines);
+    }
+
+    /// Adds a line that comes from a line of a file.
+    pub(super) fn push(&mut self, line: &str, from: (&'static str, usize)) {
         // writing to a String does not fail
         let _ = writeln!(self.text, "{line}");
         self.lines.push(from);

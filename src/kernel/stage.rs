@@ -2,13 +2,13 @@
 
 use super::buffer::{Buffer, Description};
 use super::interface::{Access, Slot};
-use super::lane::{Isa, Lane, Real, Work};
-use super::row::Row;
+use super::io::Io;
+use super::lane::{Lane, Real, Work};
 use super::shader::Shader;
 use bytemuck::Pod;
 use std::marker::PhantomData;
 use std::ops::Range;
-use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
+use std::sync::Arc;
 
 /// The buffer to bind to a slot, if any, and the number of entries per item if only the plan knows it.
 #[derive(Debug, Clone, Copy)]
@@ -45,6 +45,26 @@ macro_rules! wires {
 }
 pub(crate) use wires;
 
+/// When the items of a stage run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Order {
+    /// After all previous stages.
+    Waits,
+    /// Beside the previous stages, back to the last one that waits.
+    Beside,
+    /// As a link of a chain: each unit of items after the same unit of the stage before, whatever becomes of the others.
+    Follows,
+}
+
+/// How the items of a stage are cut; fixed, so that results do not depend on the number of threads.
+#[derive(Debug, Clone)]
+pub(crate) enum Cut {
+    /// Chunks of so many items.
+    Grain(usize),
+    /// Units of a chain: the first item of each, and the end of the last.
+    Units(Arc<[usize]>),
+}
+
 /// One parallel loop over items. Only the crate makes stages: a kernel relies on its slots being bound as declared.
 #[derive(Clone)]
 pub struct Stage {
@@ -53,8 +73,7 @@ pub struct Stage {
     pub(crate) first: usize,
     /// Number of items.
     pub(crate) count: usize,
-    /// Items per chunk of work; fixed, so that results do not depend on the number of threads.
-    pub(crate) grain: usize,
+    pub(crate) cut: Cut,
     /// Buffers of the active slots that are read.
     pub(crate) reads: Vec<Buffer>,
     /// Buffers of the active slots that are written, numbered after the reads.
@@ -64,8 +83,7 @@ pub struct Stage {
     /// Scene constants for the text of the shader.
     pub(crate) constants: Vec<(&'static str, usize)>,
     pub(crate) kernel: Code,
-    /// Whether it waits for the previous stages; else it may run beside them.
-    pub(crate) waits: bool,
+    pub(crate) order: Order,
 }
 
 impl Stage {
@@ -99,7 +117,8 @@ impl Stage {
             assert!(!twice, "stage `{name}`: a buffer that it writes is bound twice");
         }
         let params = bytemuck::bytes_of(&params).to_vec();
-        Self { name, first: 0, count, grain, reads, writes, params, constants: Vec::new(), kernel, waits: true }
+        let (cut, order) = (Cut::Grain(grain), Order::Waits);
+        Self { name, first: 0, count, cut, reads, writes, params, constants: Vec::new(), kernel, order }
     }
 
     /// A stage of a kernel from outside the crate, with its items, and buffers by slot name.
@@ -118,13 +137,28 @@ impl Stage {
 
     /// Lets the stage run beside the previous ones.
     pub(crate) fn beside(self) -> Self {
-        Self { waits: false, ..self }
+        Self { order: Order::Beside, ..self }
+    }
+
+    /// Cuts the items into the units of a chain, which `starts` with it unless it follows another stage.
+    pub(crate) fn in_units(self, units: &Arc<[usize]>, starts: bool) -> Self {
+        assert_eq!(units.last(), Some(&self.count), "stage `{}`: units cover all items", self.name);
+        let order = if starts { Order::Waits } else { Order::Follows };
+        Self { cut: Cut::Units(Arc::clone(units)), order, ..self }
+    }
+
+    /// Whether it is the next link of a chain whose last stage is `before`.
+    pub(crate) fn continues(&self, before: &Self) -> bool {
+        match (&before.cut, &self.cut) {
+            (Cut::Units(old), Cut::Units(new)) => self.order == Order::Follows && old.len() == new.len(),
+            _ => false,
+        }
     }
 
     /// The first `count` items of the stage as one chunk.
     pub fn beginning(&self, count: usize) -> Self {
         assert!(count <= self.count, "stage `{}` has {} items", self.name, self.count);
-        Self { count, grain: count, ..self.clone() }
+        Self { count, cut: Cut::Grain(count), order: Order::Waits, ..self.clone() }
     }
 
     /// Name for messages, timings and `check --explain`.
@@ -135,6 +169,12 @@ impl Stage {
     /// The range of items.
     pub fn items(&self) -> Range<usize> {
         self.first..self.first + self.count
+    }
+
+    /// Buffers with the slots that they are bound to.
+    pub(crate) fn bound(&self) -> impl Iterator<Item = (Buffer, &'static Slot)> {
+        let buffers = self.reads.iter().chain(self.writes.iter().map(|(buffer, _)| buffer));
+        buffers.copied().zip(self.kernel.slots.iter().filter(|slot| slot.there))
     }
 
     /// Buffers that are read, in slot order.
@@ -247,192 +287,6 @@ fn run<K: Kernel, R: Real>(io: &Io<R>, items: Range<usize>) {
         }
     }
     R::dispatch(io.isa, Job(io, items, PhantomData::<K>));
-}
-
-/// A bound buffer.
-#[derive(Clone, Copy)]
-pub struct Binding {
-    pub address: *mut u8,
-    /// Length in numbers, and bytes per number.
-    pub len: usize,
-    pub size: usize,
-    pub access: Option<Access>,
-}
-
-/// A kernel's view of one chunk: its buffers, the row of the step and its parameters.
-pub struct Io<'a, R: Real> {
-    pub(crate) bindings: &'a [Binding],
-    pub row: &'a Row<R>,
-    pub(crate) params: &'a [u8],
-    pub(crate) isa: Isa,
-    pub(crate) items: Range<usize>,
-}
-
-// SAFETY: addresses are only turned into references in the ways that `Access` allows, which keeps the items of one
-// stage apart; stages run one after the other.
-unsafe impl<R: Real> Sync for Io<'_, R> {}
-
-impl<R: Real> Io<'_, R> {
-    /// A buffer; checks the size of its numbers against the type used by the kernel.
-    fn binding<T>(&self, index: usize) -> Binding {
-        let b = self.bindings[index];
-        assert_eq!(b.size, size_of::<T>(), "buffer {index} holds other numbers");
-        b
-    }
-
-    fn read<T>(&self, index: usize) -> &[T] {
-        let b = self.binding::<T>(index);
-        assert!(b.access.is_none(), "buffer {index} is bound for writing");
-        // SAFETY: the backend binds live arrays, and no stage writes to a buffer that it reads.
-        unsafe { std::slice::from_raw_parts(b.address.cast(), b.len) }
-    }
-
-    /// Scalars bound for reading.
-    #[inline(always)]
-    pub fn scalars(&self, index: usize) -> &[R] {
-        self.read(index)
-    }
-    /// Signed integers bound for reading.
-    #[inline(always)]
-    pub fn ints(&self, index: usize) -> &[i32] {
-        self.read(index)
-    }
-    /// Unsigned integers bound for reading.
-    #[inline(always)]
-    pub fn uints(&self, index: usize) -> &[u32] {
-        self.read(index)
-    }
-
-    /// The numbers that the items of this chunk own in a buffer.
-    pub fn own<T: Pod>(&self, index: usize) -> Own<'_, T> {
-        let b = self.binding::<T>(index);
-        let Some(Access::Own { planes, stride }) = b.access else { panic!("buffer {index} is not bound as Own") };
-        Own {
-            address: b.address.cast(),
-            plane: b.len / planes,
-            planes,
-            stride,
-            items: self.items.clone(),
-            life: PhantomData,
-        }
-    }
-
-    /// A buffer in which items write to disjoint places given by a table.
-    pub fn scatter<T: Pod>(&self, index: usize) -> Scatter<'_, T> {
-        let b = self.binding::<T>(index);
-        assert_eq!(b.access, Some(Access::Scatter), "buffer {index} is not bound as Scatter");
-        Scatter { address: b.address.cast(), len: b.len, life: PhantomData }
-    }
-
-    /// Signed integers to which every item may add.
-    pub fn atomics(&self, index: usize) -> &[AtomicI32] {
-        let b = self.binding::<AtomicI32>(index);
-        assert_eq!(b.access, Some(Access::Atomic), "buffer {index} is not bound as Atomic");
-        // SAFETY: atomics may be shared.
-        unsafe { std::slice::from_raw_parts(b.address.cast(), b.len) }
-    }
-
-    /// Unsigned integers to which every item may add.
-    pub fn atomic_uints(&self, index: usize) -> &[AtomicU32] {
-        let b = self.binding::<AtomicU32>(index);
-        assert_eq!(b.access, Some(Access::Atomic), "buffer {index} is not bound as Atomic");
-        // SAFETY: atomics may be shared.
-        unsafe { std::slice::from_raw_parts(b.address.cast(), b.len) }
-    }
-
-    /// The constants of the stage.
-    #[inline(always)]
-    pub fn params<P: Pod>(&self) -> P {
-        bytemuck::pod_read_unaligned(self.params)
-    }
-}
-
-/// The part of a buffer that a chunk of items owns.
-pub struct Own<'a, T> {
-    address: *mut T,
-    plane: usize,
-    planes: usize,
-    stride: usize,
-    items: Range<usize>,
-    life: PhantomData<&'a mut T>,
-}
-
-impl<T: Pod> Own<'_, T> {
-    /// The numbers of items `first .. first + count` in one plane.
-    #[inline(always)]
-    pub fn slice(&mut self, plane: usize, first: usize, count: usize) -> &mut [T] {
-        assert!(plane < self.planes && first >= self.items.start && first + count <= self.items.end);
-        // SAFETY: the items are this chunk's, chunks are disjoint, and the borrow of `self` keeps slices apart.
-        unsafe {
-            std::slice::from_raw_parts_mut(
-                self.address.add(plane * self.plane + first * self.stride),
-                count * self.stride,
-            )
-        }
-    }
-
-    /// The numbers of one item in one plane.
-    #[inline(always)]
-    pub fn item(&mut self, plane: usize, item: usize) -> &mut [T] {
-        self.slice(plane, item, 1)
-    }
-
-    /// The first number of one item in one plane.
-    #[inline(always)]
-    pub fn at(&mut self, plane: usize, item: usize) -> &mut T {
-        &mut self.slice(plane, item, 1)[0]
-    }
-}
-
-/// A buffer with disjoint writes.
-pub struct Scatter<'a, T> {
-    address: *mut T,
-    len: usize,
-    life: PhantomData<&'a mut T>,
-}
-
-impl<T: Pod> Scatter<'_, T> {
-    /// Numbers in the buffer.
-    pub fn len(&self) -> usize {
-        self.len
-    }
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-    #[inline(always)]
-    pub fn get(&self, index: usize) -> T {
-        assert!(index < self.len);
-        // SAFETY: in range, and only this item touches this place.
-        unsafe { *self.address.add(index) }
-    }
-    #[inline(always)]
-    pub fn set(&mut self, index: usize, value: T) {
-        assert!(index < self.len);
-        // SAFETY: in range, and only this item touches this place.
-        unsafe { *self.address.add(index) = value }
-    }
-    /// Numbers `first .. first + count`, all of which only this item touches.
-    #[inline(always)]
-    pub fn slice(&mut self, first: usize, count: usize) -> &mut [T] {
-        assert!(first <= self.len && count <= self.len - first);
-        // SAFETY: in range, only this item touches these places, and the borrow of `self` keeps slices apart.
-        unsafe { std::slice::from_raw_parts_mut(self.address.add(first), count) }
-    }
-}
-
-/// A number stored as the bits of an f32.
-#[inline(always)]
-pub fn read<R: Real>(place: &AtomicU32) -> R {
-    R::from_f64(f64::from(f32::from_bits(place.load(Ordering::Relaxed))))
-}
-
-/// Raises a shared maximum of non-negative numbers, stored as the bits of an f32.
-#[inline(always)]
-pub fn raise<R: Real>(place: &AtomicU32, value: R) {
-    let bits = (value.to_f64() as f32).to_bits();
-    if bits > place.load(Ordering::Relaxed) {
-        place.fetch_max(bits, Ordering::Relaxed);
-    }
 }
 
 #[cfg(test)]

@@ -227,7 +227,8 @@ impl ContactScene<'_> {
         let wires = [&self.place()[..], &search.wires(), &self.lines(offsets), &wires![status]].concat();
         let kernel = flagged!(grid::FillBeams; self.tables.active.periodic);
         let stage = Stage::new("threads to grid", kernel, (self.beams.count, 32), &wires, params);
-        b.plan.search.push(Stage { first: slabs, waits: slabs == 0, ..stage });
+        let stage = Stage { first: slabs, ..stage };
+        b.plan.search.push(if slabs == 0 { stage } else { stage.beside() });
     }
 
     /// Inputs of the lines of beams.
@@ -269,7 +270,7 @@ impl ContactScene<'_> {
         let wires = [&searched[..], &self.place(), &search.wires(), &tables.wires()].concat();
         let kernel = flagged!(candidates::Candidates; thread, periodic);
         let stage = Stage::new(names.search, kernel, (lists, 64), &wires, params);
-        b.plan.search.push(Stage { waits, ..stage });
+        b.plan.search.push(if waits { stage } else { stage.beside() });
 
         let wires = wires![
             nodes,

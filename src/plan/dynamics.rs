@@ -5,16 +5,14 @@ use super::beams::{Beams, Bends};
 use super::builder::{Builder, NODE_GRAIN};
 use super::contact::ContactParts;
 use super::hexes::Hexes;
+use super::lines::Units;
 use super::nodes::Nodes;
 use crate::conditions::prescribed::{self, Prescribed};
 use crate::dynamics::assemble::{self, Assemble};
-use crate::dynamics::fibre_lines::{self, FibreLines, Group};
+use crate::dynamics::fibre_lines::{self, FibreLines};
 use crate::dynamics::integrate::{self, Integrate};
-use crate::elements::LANES;
 use crate::kernel::buffer::{Buffer, Initial, Kind};
-use crate::kernel::position::quanta;
 use crate::kernel::stage::{Code, Stage, flagged, wires};
-use crate::mesh::Mesh;
 
 /// Results of assembly for later stages.
 pub(super) struct Assembled {
@@ -33,6 +31,7 @@ pub(super) fn assemble(
     nodes: &Nodes,
     (hexes, beams, bends): (&Hexes, &Beams, Option<&Bends>),
     contact: Option<&ContactParts>,
+    units: &Units,
 ) -> Assembled {
     let solid_slots = b.indices("corner slots of solid nodes", t.solids.slots.clone());
     let thread_slots = b.indices("slots of thread nodes", t.threads.slots.clone());
@@ -67,7 +66,8 @@ pub(super) fn assemble(
     ];
     let active = t.active;
     let kernel = flagged!(Assemble; contact.is_some(), active.contact_mass, active.bending, active.gravity);
-    b.plan.step.push(Stage::new("assemble", kernel, (nodes.count, NODE_GRAIN), &wires, params));
+    let stage = Stage::new("assemble", kernel, (nodes.count, NODE_GRAIN), &wires, params);
+    b.plan.step.push(stage.in_units(&units.nodes, true));
     Assembled { thread_slots, added_mass, mass_per_stiffness: params.mass_per_stiffness }
 }
 
@@ -82,7 +82,7 @@ pub(super) struct Held {
 
 impl Held {
     /// Adds prescribed motion if the scene has any.
-    pub fn add(b: &mut Builder, t: &Tables, nodes: &Nodes) -> Option<Self> {
+    pub fn add(b: &mut Builder, t: &Tables, nodes: &Nodes, units: &Units) -> Option<Self> {
         let count = t.conditions.count();
         if count == 0 {
             return None;
@@ -94,28 +94,36 @@ impl Held {
         let wires = wires![nodes: at, targets, velocity, mass, acceleration, inverse_mass, work, reactions: reaction];
         let params = prescribed::Params { first_thread: nodes.first_thread as u32 };
         let kernel = flagged!(Prescribed; t.active.damping);
-        b.plan.step.push(Stage::new("prescribed", kernel, (count, NODE_GRAIN), &wires, params));
+        let stage = Stage::new("prescribed", kernel, (count, NODE_GRAIN), &wires, params);
+        b.plan.step.push(stage.in_units(&units.conditions, false));
         Some(Self { count, nodes: at, reaction, work })
     }
 }
 
 /// Adds fibre lines if the scene has any; returns their correction of the accelerations.
-pub(super) fn fibre_lines(b: &mut Builder, t: &Tables, nodes: &Nodes, held: Option<&Held>) -> Option<Buffer> {
-    let lines = t.fibre_lines()?;
+pub(super) fn fibre_lines(
+    b: &mut Builder,
+    t: &Tables,
+    nodes: &Nodes,
+    held: Option<&Held>,
+    units: &Units,
+) -> Option<Buffer> {
+    let chosen = t.fibre_lines()?;
     let correction = b.scratch("line correction", 3 * nodes.count);
-    let groups = b.indices("fibre lines", bytemuck::cast_slice(&t.lines).to_vec());
+    let lines = b.indices("fibre lines", bytemuck::cast_slice(&t.lines).to_vec());
     let stiffness = b.table("line stiffness", t.line_stiffness());
     let &Nodes { reference, quanta, remainder, acceleration, inverse_mass, .. } = nodes;
-    let wires = wires![groups, stiffness, reference, quanta, remainder, acceleration, inverse_mass, correction];
-    let params = fibre_lines::Params { beta: lines.beta as f32 };
-    let longest = t.lines.iter().map(|g| g.stations as usize).max().unwrap_or(1);
+    let wires = wires![lines, stiffness, reference, quanta, remainder, acceleration, inverse_mass, correction];
+    let params = fibre_lines::Params { beta: chosen.beta as f32 };
+    let longest = t.lines.iter().filter(|line| line.has_fibres()).map(|line| line.nodes().len()).max().unwrap_or(1);
     let kernel = flagged!(FibreLines; t.active.periodic);
-    let stage = Stage::new("fibre lines", kernel, (t.lines.len(), 1), &wires, params);
+    let stage = Stage::new("fibre lines", kernel, (t.lines.len(), 1), &wires, params).in_units(&units.lines, false);
     b.plan.step.push(Stage { constants: vec![("STATIONS", longest)], ..stage });
     if let Some(held) = held {
         let wires = wires![nodes: held.nodes, correction];
         let kernel = Code::of::<prescribed::Hold>();
-        b.plan.step.push(Stage::new("hold", kernel, (held.count, NODE_GRAIN), &wires, [0u32; 0]));
+        let stage = Stage::new("hold", kernel, (held.count, NODE_GRAIN), &wires, [0u32; 0]);
+        b.plan.step.push(stage.in_units(&units.conditions, false));
     }
     Some(correction)
 }
@@ -127,6 +135,7 @@ pub(super) fn integrate(
     nodes: &Nodes,
     added_mass: Option<Buffer>,
     correction: Option<Buffer>,
+    units: &Units,
 ) {
     let params = integrate::Params { first_thread: nodes.first_thread as u32, gravity: t.gravity() };
     let &Nodes { acceleration, mass, true_mass, velocity, quanta, remainder, work, status, .. } = nodes;
@@ -135,45 +144,6 @@ pub(super) fn integrate(
         wires![acceleration, mass, inverse_mass, correction, true_mass, velocity, quanta, remainder, work, status];
     let active = t.active;
     let kernel = flagged!(Integrate; active.fibre_lines, active.gravity, active.damping, active.contact_mass);
-    b.plan.step.push(Stage::new("integrate", kernel, (nodes.count, NODE_GRAIN), &wires, params));
-}
-
-/// Groups of up to sixteen lines of equal length with consecutive nodes.
-pub(super) fn line_groups(mesh: &Mesh, with_threads: bool) -> Vec<Group> {
-    let shift = |wrap: Option<[i32; 2]>| {
-        let period = mesh.period.unwrap_or_default().map(quanta);
-        let wrap = wrap.unwrap_or_default();
-        [wrap[0] * period[0], wrap[1] * period[1]]
-    };
-    let blocks = mesh.blocks.iter().map(|b| (b.first, b.lines(), b.stations(), b.wrap));
-    let threads = mesh.threads.iter().filter(|_| with_threads).map(|t| (t.first, 1, t.count, t.wrap));
-    let mut groups: Vec<Group> = Vec::new();
-    for (first, lines, stations, wrap) in threads.chain(blocks) {
-        // a closed line of two nodes has two segments between the same nodes: its fibres stay explicit
-        if stations < 2 + usize::from(wrap.is_some()) {
-            continue;
-        }
-        for start in (0..lines).step_by(LANES) {
-            let count = (lines - start).min(LANES);
-            let group = Group {
-                first: (first + start * stations) as u32,
-                lines: count as u32,
-                stations: stations as u32,
-                closed: u32::from(wrap.is_some()),
-                shift: shift(wrap),
-            };
-            match groups.last_mut() {
-                Some(last)
-                    if lines == 1
-                        && last.lines < LANES as u32
-                        && (last.stations, last.closed, last.shift) == (group.stations, group.closed, group.shift)
-                        && last.first + last.lines * last.stations == group.first =>
-                {
-                    last.lines += 1;
-                }
-                _ => groups.push(group),
-            }
-        }
-    }
-    groups
+    let stage = Stage::new("integrate", kernel, (nodes.count, NODE_GRAIN), &wires, params);
+    b.plan.step.push(stage.in_units(&units.nodes, false));
 }

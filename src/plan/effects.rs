@@ -1,6 +1,6 @@
 //! Active effects of a scene: requested by its settings, and applicable to something in it.
 
-use crate::dynamics::fibre_lines::Group;
+use crate::dynamics::fibre_lines::Line;
 use crate::dynamics::integrate::Works;
 use crate::mesh::Mesh;
 use crate::scene::Scene;
@@ -27,8 +27,8 @@ pub struct Active {
 }
 
 impl Active {
-    /// Effects of a scene with known fibre lines.
-    pub fn new(scene: &Scene, lines: &[Group]) -> Self {
+    /// Effects of a scene with known lines of nodes.
+    pub fn new(scene: &Scene, lines: &[Line]) -> Self {
         let Scene { mesh, effects, .. } = scene;
         let (yarns, threads) = (mesh.blocks.len(), mesh.threads.len());
         let contact = effects.contact.as_ref();
@@ -50,7 +50,7 @@ impl Active {
                 d.rate_per_s > 0.0 || d.thread_settle_rate_per_s > 0.0 || d.move_rate_per_s.is_some_and(|r| r > 0.0)
             }),
             periodic: mesh.period.is_some(),
-            fibre_lines: !lines.is_empty(),
+            fibre_lines: lines.iter().any(Line::has_fibres),
             contact_mass: (touches || ties)
                 && effects.contact_mass.as_ref().is_some_and(|mass| mass.factor > 0.0 || mass.least_limit_s > 0.0),
             ties,

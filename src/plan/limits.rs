@@ -65,8 +65,8 @@ pub(super) fn add(
 fn covered(t: &Tables, nodes: &Nodes) -> Vec<bool> {
     let mut covered = vec![false; nodes.count];
     if t.active.fibre_lines {
-        for group in &t.lines {
-            covered[group.first as usize..][..(group.lines * group.stations) as usize].fill(true);
+        for line in t.lines.iter().filter(|line| line.has_fibres()) {
+            covered[line.nodes()].fill(true);
         }
     } else {
         // in the bounds of hexahedra

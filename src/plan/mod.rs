@@ -1,7 +1,7 @@
 //! From a scene to buffers and stages. Reading [`build`] is reading the algorithm.
 //!
-//! A step has these stages: forces of hexahedra, beams, bends and contact, side by side; assembly to accelerations; prescribed
-//! motion; fibre lines; integration. When the contact skin (Verlet skin) is used up: grid, then candidates. For energies and
+//! A step has these stages: forces of hexahedra, beams, bends and contact, side by side; then a chain for each line of nodes:
+//! assembly to accelerations, prescribed motion, fibre lines, integration. When the contact skin (Verlet skin) is used up: grid, then candidates. For energies and
 //! limits: the diagnose stages, then the collect stages, which sum what the host reads. An inactive effect ([`Active`]) adds no
 //! buffer, no stage, and no text or branch to shared stages.
 #![warn(clippy::too_many_lines)]
@@ -14,6 +14,7 @@ mod dynamics;
 mod effects;
 mod hexes;
 mod limits;
+mod lines;
 mod model;
 mod nodes;
 mod perturbation;
@@ -23,7 +24,7 @@ mod surfaces;
 mod threads;
 mod totals;
 
-use crate::dynamics::fibre_lines::Group;
+use crate::dynamics::fibre_lines::Line;
 use crate::error::Result;
 use crate::kernel::buffer::Buffer;
 use crate::mesh::Mesh;
@@ -38,6 +39,7 @@ use contact::{ContactParts, ContactScene, PairBuffers};
 use dynamics::{Assembled, Held};
 pub use effects::Active;
 use hexes::Hexes;
+use lines::Units;
 pub use model::{Buffers, Capacity, ContactPoint, Limits, Model};
 use nodes::{Nodes, Searched};
 use solids::Solids;
@@ -69,12 +71,13 @@ pub fn build(scene: &Scene, capacity: Capacity) -> Result<Model> {
         searched.remember(b, &nodes);
     }
     let elements = (&hexes, &beams, bends.as_ref());
-    let assembled = dynamics::assemble(b, t, &nodes, elements, contact.as_ref());
+    let units = Units::new(t);
+    let assembled = dynamics::assemble(b, t, &nodes, elements, contact.as_ref(), &units);
     let forces = b.plan.step.len();
 
-    let held = Held::add(b, t, &nodes);
-    let correction = dynamics::fibre_lines(b, t, &nodes, held.as_ref());
-    dynamics::integrate(b, t, &nodes, assembled.added_mass, correction);
+    let held = Held::add(b, t, &nodes, &units);
+    let correction = dynamics::fibre_lines(b, t, &nodes, held.as_ref(), &units);
+    dynamics::integrate(b, t, &nodes, assembled.added_mass, correction, &units);
 
     let elements = (&mut hexes, &beams, bends.as_ref());
     let weighed_limit = limits::add(b, t, &nodes, elements, &assembled, held.as_ref());
@@ -91,8 +94,8 @@ struct Tables<'a> {
     mesh: Cow<'a, Mesh>,
     conditions: Conditions,
     active: Active,
-    /// Groups of fibre lines.
-    lines: Vec<Group>,
+    /// Lines of consecutive nodes, which together have every node once.
+    lines: Vec<Line>,
     solids: Solids,
     threads: Threads,
 }
@@ -101,8 +104,7 @@ impl<'a> Tables<'a> {
     fn new(scene: &'a Scene) -> Result<Self> {
         let conditions = Conditions::new(scene)?;
         let mesh = centred(&scene.mesh);
-        let chosen = scene.effects.fibre_lines.as_ref();
-        let lines = chosen.map_or_else(Vec::new, |lines| dynamics::line_groups(&mesh, lines.threads));
+        let lines = lines::lines(&mesh, scene.effects.fibre_lines.as_ref());
         let active = Active::new(scene, &lines);
         let solids = Solids::new(&mesh, scene.integration.hourglass_control())?;
         let threads = Threads::new(&mesh, active.bending, &conditions.held);

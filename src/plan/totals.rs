@@ -147,7 +147,7 @@ impl Collector<'_> {
         let wires = wires![source: buffer, totals: self.totals];
         let work = (sums.parts * sums.columns, GRAIN);
         let stage = Stage::new("totals taken", Code::of::<Sum<true>>(), work, &wires, params);
-        self.b.plan.collect.push(Stage { waits, ..stage });
+        self.b.plan.collect.push(if waits { stage } else { stage.beside() });
         sums
     }
 

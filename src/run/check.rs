@@ -96,9 +96,11 @@ pub fn check(loaded: &Loaded, explain: bool) -> Result<String> {
 }
 
 /// Names and seconds of the stages since an earlier reading.
-fn since(before: &[(&'static str, f64)], now: Vec<(&'static str, f64)>) -> Vec<(&'static str, f64)> {
-    let old = |name| before.iter().find(|(known, _)| *known == name).map_or(0.0, |(_, seconds)| *seconds);
-    now.into_iter().map(|(name, seconds)| (name, seconds - old(name))).collect()
+fn since(before: &[(String, f64)], mut now: Vec<(String, f64)>) -> Vec<(String, f64)> {
+    for (name, seconds) in &mut now {
+        *seconds -= before.iter().find(|(known, _)| known == name).map_or(0.0, |(_, seconds)| *seconds);
+    }
+    now
 }
 
 /// A scene for a trial, after its first contact search.
@@ -110,19 +112,13 @@ fn begun(loaded: &Loaded) -> Result<Simulation> {
 
 /// Cause of each effect and its share of the time of all stages: the time of its own stages or, where it shares stages with
 /// other effects, from trials without it.
-fn costs(
-    t: &mut String,
-    loaded: &Loaded,
-    found: &[Effect],
-    stages: &[(&'static str, f64)],
-    per_step: f64,
-) -> Result<()> {
+fn costs(t: &mut String, loaded: &Loaded, found: &[Effect], stages: &[(String, f64)], per_step: f64) -> Result<()> {
     let total: f64 = stages.iter().map(|(_, seconds)| seconds).sum();
     let steps = ((TURNS_S / (2 * TURNS) as f64 / per_step) as u64).clamp(32, 256);
     let mut all = begun(loaded)?;
     let _ = write!(t, "\neffects, their share of the time of a step where the run starts, and what called for them");
     for effect in found {
-        let own = stages.iter().filter(|(name, _)| effect.stages.contains(name));
+        let own = stages.iter().filter(|(name, _)| effect.stages.contains(&&name[..]));
         let share = 100.0 * own.map(|(_, seconds)| seconds).sum::<f64>() / total;
         let shown = match effect.without(loaded).filter(|_| effect.stages.is_empty()) {
             Some(without) => match begun(&without) {

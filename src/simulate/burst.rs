@@ -23,7 +23,8 @@ impl Simulation {
             let second = if step + 1 == steps && looks { 0.0 } else { 0.5 * ahead };
             let affine = 2.0 * largest(row.rate) * AFFINE_REACH;
             let searched = if step == 0 && self.is_listed_anew { 1.0 } else { 0.0 };
-            rows.push(Row { affine, searched, thermal_increment: first + second, ..row });
+            let turn = ((self.step + step) % 3) as f64;
+            rows.push(Row { affine, searched, turn, thermal_increment: first + second, ..row });
             self.dt_before = self.dt;
             time += self.dt;
         }

@@ -3,7 +3,7 @@
 use super::{Simulation, StressMean};
 use crate::contact::{status, sums};
 use crate::error::Result;
-use crate::kernel::stage::Stage;
+use crate::kernel::stage::{Order, Stage};
 use crate::measure::shear::trellis;
 use crate::plan::Sums;
 
@@ -94,7 +94,8 @@ impl Simulation {
     pub(super) fn contact_at_rest(&mut self) -> Result<f64> {
         let b = self.model.buffers.clone();
         let (Some(force), Some(stiffness)) = (b.contact_force, b.contact_stiffness) else { return Ok(0.0) };
-        let contact = |stage: &&Stage| stage.writes.iter().any(|(buffer, _)| *buffer == force) && !stage.waits;
+        let contact =
+            |stage: &&Stage| stage.writes.iter().any(|(buffer, _)| *buffer == force) && stage.order == Order::Beside;
         let stages: Vec<Stage> = self.model.plan.step.iter().filter(contact).cloned().collect();
         let row = self.row(self.time, 1e-12, 1e-12);
         self.backend.run(&stages, &[row]);

@@ -100,7 +100,7 @@ pub struct Simulation {
     /// Slave nodes and beams searched since the last full search.
     searched: u64,
     /// Seconds in stages of earlier backends, which were replaced when tables grew.
-    spent_before: Vec<(&'static str, f64)>,
+    spent_before: Vec<(String, f64)>,
     /// Largest speed of a node after the last burst, mm/s.
     speed: f64,
     /// Steps of the next burst.
@@ -202,7 +202,7 @@ impl Simulation {
         self.searches
     }
     /// Seconds spent in each stage so far, by name.
-    pub fn timings(&self) -> Vec<(&'static str, f64)> {
+    pub fn timings(&self) -> Vec<(String, f64)> {
         let mut all = self.spent_before.clone();
         for (name, spent) in self.backend.timings() {
             match all.iter_mut().find(|(known, _)| *known == name) {

@@ -14,9 +14,11 @@ use tricot::contact::{EMPTY, memory};
 use tricot::error::Error;
 use tricot::kernel::buffer::Kind;
 use tricot::kernel::interface::Slot;
+use tricot::kernel::io::Io;
 use tricot::kernel::lane::{Lane, Real};
 use tricot::kernel::shader::Shader;
-use tricot::kernel::stage::{Io, Kernel, Stage};
+
+use tricot::kernel::stage::{Kernel, Stage};
 use tricot::output::checkpoint::Checkpoint;
 use tricot::settings::integration::Precision::{F32, F64};
 

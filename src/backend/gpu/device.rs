@@ -6,14 +6,14 @@ use crate::backend::Backend;
 use crate::backend::adapter::Adapter;
 use crate::error::{Error, Result};
 use crate::kernel::buffer::Description;
-use crate::kernel::shader::Text;
-use crate::kernel::stage::Stage;
+use crate::kernel::dispatch::Dispatch;
 use std::collections::HashMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Storage buffers that the widest stage binds.
+/// Storage buffers that the widest stage binds, and that a dispatch of several stages may bind.
 const STORAGE_BUFFERS: u32 = 16;
+const MOST_STORAGE_BUFFERS: u32 = 32;
 
 /// Kind of an adapter that computes on the CPU.
 const SOFTWARE: &str = "software";
@@ -139,7 +139,9 @@ impl Device {
         }
         let wanted = adapter.limits();
         let limits = wgpu::Limits {
-            max_storage_buffers_per_shader_stage: STORAGE_BUFFERS,
+            max_storage_buffers_per_shader_stage: wanted.max_storage_buffers_per_shader_stage.min(MOST_STORAGE_BUFFERS),
+            max_buffers_and_acceleration_structures_per_shader_stage: wanted
+                .max_buffers_and_acceleration_structures_per_shader_stage,
             max_storage_buffer_binding_size: wanted.max_storage_buffer_binding_size,
             max_buffer_size: wanted.max_buffer_size,
             max_compute_workgroup_storage_size: wanted.max_compute_workgroup_storage_size,
@@ -227,14 +229,14 @@ impl Device {
         )))
     }
 
-    /// The compiled shader of a stage; compiled once for each text.
-    pub(super) fn pipeline(&self, stage: &Stage) -> Result<Arc<Pipeline>> {
-        let text = Text::of(stage)?;
+    /// The compiled shader of a dispatch; compiled once for each text.
+    pub(super) fn pipeline(&self, dispatch: &Dispatch) -> Result<Arc<Pipeline>> {
+        let text = dispatch.text()?;
         let mut known = locked(&self.pipelines);
         if let Some(pipeline) = known.get(&text.text) {
             return Ok(Arc::clone(pipeline));
         }
-        let pipeline = Arc::new(Pipeline::new(self, stage, &text)?);
+        let pipeline = Arc::new(Pipeline::new(self, dispatch, &text)?);
         known.insert(text.text, Arc::clone(&pipeline));
         Ok(pipeline)
     }
@@ -242,6 +244,13 @@ impl Device {
     /// Memory that the workgroups of a stage may share, bytes.
     pub(super) fn workgroup_bytes(&self) -> u32 {
         self.limits.max_compute_workgroup_storage_size
+    }
+
+    /// Storage buffers that a dispatch may bind.
+    pub(super) fn storage_buffers(&self) -> usize {
+        let all = self.limits.max_buffers_and_acceleration_structures_per_shader_stage;
+        let of_any_kind = all - self.limits.max_uniform_buffers_per_shader_stage;
+        self.limits.max_storage_buffers_per_shader_stage.min(of_any_kind) as usize
     }
 
     /// Workgroups in one row of a dispatch.

@@ -1,6 +1,6 @@
 //! The GPU backend: the WGSL twins of the stages, through wgpu. Only this folder knows wgpu.
 //!
-//! Steps are recorded into compute passes, with a dispatch for each stage and an offset into a buffer of rows for each step. A few
+//! Steps are recorded into compute passes, as dispatches of one stage or several with an offset into a buffer of rows for each step. A few
 //! steps are one submission, so that the device computes while the host records the next ones; no submission takes longer than
 //! drivers allow. The host waits only for numbers that it asked for, once for all of them: see `readback`.
 //!
@@ -21,6 +21,7 @@ pub use rates::Rates;
 use super::{Backend, Traffic};
 use crate::error::{Error, Result};
 use crate::kernel::buffer::{Array, Buffer, Contents, Description, Initial, Kind};
+use crate::kernel::dispatch::Dispatch;
 use crate::kernel::row::Row;
 use crate::kernel::stage::Stage;
 use clock::{Clock, Time};
@@ -172,10 +173,8 @@ impl Gpu {
         bytemuck::pod_collect_to_vec(&self.bytes(buffer))
     }
 
-    /// Records stages for rows in place; each stage in its own pass if timed.
-    fn record(&self, work: &mut Work, stages: &[Stage], rows: &[u32], timed: bool) {
-        let ready: Vec<(&Stage, &Bound)> =
-            stages.iter().filter(|s| s.count > 0).filter_map(|s| Some((s, self.bound.get(&key(s))?))).collect();
+    /// Records dispatches for rows in place; each in its own pass if timed.
+    fn record(&self, work: &mut Work, ready: &[&Bound], rows: &[u32], timed: bool) {
         let dispatch = |pass: &mut wgpu::ComputePass, bound: &Bound| {
             pass.set_pipeline(&bound.pipeline.pipeline);
             pass.set_bind_group(1, &bound.buffers, &[]);
@@ -185,31 +184,31 @@ impl Gpu {
         let Work { encoder, clock, traffic, .. } = work;
         traffic.dispatches += (ready.len() * rows.len()) as u64;
         if let Some(clock) = clock.as_mut().filter(|clock| timed && clock.takes(ready.len())) {
-            for (i, (stage, bound)) in ready.iter().enumerate() {
-                let (label, timestamp_writes) = (Some(stage.name), Some(clock.around(i)));
+            for (i, bound) in ready.iter().enumerate() {
+                let (label, timestamp_writes) = (Some(&bound.name[..]), Some(clock.around(i)));
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes });
                 pass.set_bind_group(0, &self.row_group, &[rows[0]]);
                 dispatch(&mut pass, bound);
             }
-            clock.resolve(encoder, ready.iter().map(|(stage, _)| stage.name));
+            clock.resolve(encoder, ready.iter().map(|bound| bound.name.clone()));
             return;
         }
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         for row in rows {
             pass.set_bind_group(0, &self.row_group, &[*row]);
-            ready.iter().for_each(|(_, bound)| dispatch(&mut pass, bound));
+            ready.iter().for_each(|bound| dispatch(&mut pass, bound));
         }
     }
 
-    /// Whether a call of a list of stages, each run `rows` times, is timed.
-    fn counts(&self, stages: &[Stage], rows: u64) -> bool {
+    /// Whether a call of a list of dispatches, each run `rows` times, is timed.
+    fn counts(&self, ready: &[&Bound], rows: u64) -> bool {
         let work = &mut *self.work.borrow_mut();
         let mut timed = false;
-        for stage in stages.iter().filter(|s| s.count > 0) {
-            let known = work.times.iter().position(|t| t.stage == stage.name);
+        for bound in ready {
+            let known = work.times.iter().position(|t| t.name == bound.name);
             let place = known.unwrap_or(work.times.len());
             if known.is_none() {
-                work.times.push(Time::new(stage.name));
+                work.times.push(Time::new(bound.name.clone()));
             }
             timed |= work.times[place].is_due(rows);
         }
@@ -217,25 +216,30 @@ impl Gpu {
     }
 }
 
-/// Hash that identifies a stage among the stages of its plan.
-fn key(stage: &Stage) -> u64 {
+/// Hash that identifies a dispatch among those of its plan.
+fn key(dispatch: &Dispatch) -> u64 {
     let mut hasher = DefaultHasher::new();
-    (stage.kernel.shader, stage.first, stage.count, &stage.reads, &stage.params).hash(&mut hasher);
-    stage.writes.iter().for_each(|(buffer, _)| buffer.hash(&mut hasher));
+    for stage in dispatch.stages() {
+        (stage.kernel.shader, stage.first, stage.count, &stage.reads, &stage.params).hash(&mut hasher);
+        stage.writes.iter().for_each(|(buffer, _)| buffer.hash(&mut hasher));
+    }
     hasher.finish()
 }
 
 impl Backend for Gpu {
     fn run(&mut self, stages: &[Stage], rows: &[Row<f64>]) {
-        for stage in stages.iter().filter(|s| s.count > 0) {
-            if !self.bound.contains_key(&key(stage)) {
-                match Bound::new(&self.device, stage, &self.buffers) {
-                    Ok(bound) => _ = self.bound.insert(key(stage), bound),
+        let mut keys = Vec::new();
+        for dispatch in Dispatch::of(stages, self.device.storage_buffers()) {
+            keys.push(key(&dispatch));
+            if !self.bound.contains_key(&key(&dispatch)) {
+                match Bound::new(&self.device, &dispatch, &self.buffers) {
+                    Ok(bound) => _ = self.bound.insert(key(&dispatch), bound),
                     Err(error) => return self.device.note(&error.to_string()),
                 }
             }
         }
-        let timed = self.counts(stages, rows.len() as u64);
+        let ready: Vec<&Bound> = keys.iter().map(|key| &self.bound[key]).collect();
+        let timed = self.counts(&ready, rows.len() as u64);
         let (mut left, started) = (rows, Instant::now());
         while !left.is_empty() {
             let most = ((LONGEST / self.work.borrow().pace) as usize).clamp(1, SUBMITTED);
@@ -257,10 +261,10 @@ impl Backend for Gpu {
             let offsets: Vec<u32> = (0..now.len() as u64).map(|i| (first + i * ROW_STRIDE) as u32).collect();
             let (plain, last) = offsets.split_at(offsets.len() - usize::from(timed && left.is_empty()));
             if !plain.is_empty() {
-                self.record(&mut work, stages, plain, false);
+                self.record(&mut work, &ready, plain, false);
             }
             if !last.is_empty() {
-                self.record(&mut work, stages, last, true);
+                self.record(&mut work, &ready, last, true);
             }
             drop(work);
             if !left.is_empty() {
@@ -355,7 +359,7 @@ impl Backend for Gpu {
         self.device.fault()
     }
 
-    fn timings(&self) -> Vec<(&'static str, f64)> {
+    fn timings(&self) -> Vec<(String, f64)> {
         self.land(Vec::new());
         self.work.borrow().times.iter().map(Time::whole).collect()
     }

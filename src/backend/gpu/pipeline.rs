@@ -1,9 +1,9 @@
-//! The compiled shader of a stage, and its bound buffers.
+//! The compiled shader of a dispatch, and its bound buffers.
 
 use super::device::Device;
 use crate::error::{Error, Result};
-use crate::kernel::shader::{ENTRY, Text, WORKGROUP};
-use crate::kernel::stage::Stage;
+use crate::kernel::dispatch::Dispatch;
+use crate::kernel::shader::{ENTRY, Text};
 use std::borrow::Cow;
 use std::sync::Arc;
 use wgpu::util::DeviceExt as _;
@@ -25,12 +25,13 @@ fn entry(binding: u32, ty: wgpu::BufferBindingType) -> wgpu::BindGroupLayoutEntr
 }
 
 impl Pipeline {
-    /// Compiles the text of a stage.
+    /// Compiles the text of a dispatch.
     ///
     /// # Errors
     /// Text that does not compile, by file and line; workgroup memory beyond the adapter's.
-    pub(super) fn new(device: &Device, stage: &Stage, text: &Text) -> Result<Self> {
+    pub(super) fn new(device: &Device, dispatch: &Dispatch, text: &Text) -> Result<Self> {
         let (module, _) = text.module()?;
+        let (name, links) = (dispatch.name(), dispatch.stages().len());
         let shared: u32 = module
             .global_variables
             .iter()
@@ -39,23 +40,22 @@ impl Pipeline {
             .sum();
         if shared > device.workgroup_bytes() {
             return Err(Error::Unsupported(format!(
-                "the stage `{}` shares {shared} bytes in a workgroup, and {} has {}: coarsen the mesh along its longest yarns or threads, or \
+                "the stage `{name}` shares {shared} bytes in a workgroup, and {} has {}: coarsen the mesh along its longest yarns or threads, or \
                  use --backend cpu",
-                stage.name,
                 device.listed().name,
                 device.workgroup_bytes()
             )));
         }
         let gpu = &device.device;
-        let reads = stage.reads.len();
-        let entries: Vec<_> = (0..reads + stage.writes.len())
-            .map(|i| entry(i as u32, wgpu::BufferBindingType::Storage { read_only: i < reads }))
-            .collect();
-        let layout = |entries: &[wgpu::BindGroupLayoutEntry]| {
-            gpu.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(stage.name), entries })
+        let written = dispatch.buffers().into_iter().map(|(_, written)| written);
+        let written = written.chain(dispatch.cuts().map(|_| false));
+        let storage =
+            |(i, written): (usize, bool)| entry(i as u32, wgpu::BufferBindingType::Storage { read_only: !written });
+        let layout = |entries: Vec<wgpu::BindGroupLayoutEntry>| {
+            gpu.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(&name), entries: &entries })
         };
-        let buffers = layout(&entries);
-        let constants = layout(&[0, 1].map(|i| entry(i, wgpu::BufferBindingType::Uniform)));
+        let buffers = layout(written.enumerate().map(storage).collect());
+        let constants = layout((0..2 * links as u32).map(|i| entry(i, wgpu::BufferBindingType::Uniform)).collect());
         let source = wgpu::ShaderSource::Naga(Cow::Owned(module));
         let checks = wgpu::ShaderRuntimeChecks {
             force_loop_bounding: false,
@@ -64,12 +64,12 @@ impl Pipeline {
         };
         // SAFETY: every loop of the shaders ends after a number of turns that their tables bound, and no divisor is zero.
         let module = unsafe {
-            gpu.create_shader_module_trusted(wgpu::ShaderModuleDescriptor { label: Some(stage.name), source }, checks)
+            gpu.create_shader_module_trusted(wgpu::ShaderModuleDescriptor { label: Some(&name), source }, checks)
         };
         let pipeline = gpu.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(stage.name),
+            label: Some(&name),
             layout: Some(&gpu.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some(stage.name),
+                label: Some(&name),
                 bind_group_layouts: &[Some(&device.row_layout), Some(&buffers), Some(&constants)],
                 immediate_size: 0,
             })),
@@ -82,14 +82,15 @@ impl Pipeline {
             cache: None,
         });
         match device.fault() {
-            Some(fault) => Err(Error::Device(format!("the stage `{}` does not compile on {fault}", stage.name))),
+            Some(fault) => Err(Error::Device(format!("the stage `{name}` does not compile on {fault}"))),
             None => Ok(Self { pipeline, buffers, constants }),
         }
     }
 }
 
-/// A stage ready to be dispatched.
+/// A dispatch with its buffers.
 pub struct Bound {
+    pub(super) name: String,
     pub(super) pipeline: Arc<Pipeline>,
     pub(super) buffers: wgpu::BindGroup,
     pub(super) constants: wgpu::BindGroup,
@@ -98,20 +99,25 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// Binds the buffers of a stage, and its range of items and parameters.
-    pub(super) fn new(device: &Device, stage: &Stage, buffers: &[wgpu::Buffer]) -> Result<Self> {
-        let pipeline = device.pipeline(stage)?;
-        let uniform = |bytes: &[u8]| {
+    /// Binds the buffers of a dispatch, and the items and parameters of its stages.
+    pub(super) fn new(device: &Device, dispatch: &Dispatch, buffers: &[wgpu::Buffer]) -> Result<Self> {
+        let pipeline = device.pipeline(dispatch)?;
+        let name = dispatch.name();
+        let constant = |bytes: &[u8], usage| {
             let mut padded = bytes.to_vec();
             padded.resize(bytes.len().next_multiple_of(16).max(16), 0);
-            device.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(stage.name),
-                contents: &padded,
-                usage: wgpu::BufferUsages::UNIFORM,
-            })
+            let (label, contents) = (Some(&name[..]), &padded[..]);
+            device.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label, contents, usage })
         };
-        let items = uniform(bytemuck::bytes_of(&[stage.first as u32, stage.count as u32]));
-        let params = uniform(&stage.params);
+        let of_stages: Vec<_> = dispatch
+            .stages()
+            .iter()
+            .flat_map(|stage| {
+                let items = [stage.first as u32, stage.count as u32];
+                [bytemuck::bytes_of(&items), &stage.params].map(|bytes| constant(bytes, wgpu::BufferUsages::UNIFORM))
+            })
+            .collect();
+        let cuts = dispatch.cuts().map(|cuts| constant(bytemuck::cast_slice(&cuts), wgpu::BufferUsages::STORAGE));
         let group = |layout, bound: &[&wgpu::Buffer]| {
             let entries: Vec<_> = bound
                 .iter()
@@ -119,19 +125,20 @@ impl Bound {
                 .map(|(i, b)| wgpu::BindGroupEntry { binding: i as u32, resource: b.as_entire_binding() })
                 .collect();
             device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some(stage.name),
+                label: Some(&name),
                 layout,
                 entries: &entries,
             })
         };
-        let all = stage.reads.iter().chain(stage.writes.iter().map(|(b, _)| b));
-        let all: Vec<&wgpu::Buffer> = all.map(|b| &buffers[b.0]).collect();
-        let workgroups = (stage.count * stage.kernel.shader.share.invocations()).div_ceil(WORKGROUP);
+        let bound = dispatch.buffers();
+        let all: Vec<&wgpu::Buffer> = bound.iter().map(|(b, _)| &buffers[b.0]).chain(&cuts).collect();
+        let workgroups = dispatch.workgroups();
         let row = device.workgroups_in_a_row();
         Ok(Self {
             buffers: group(&pipeline.buffers, &all),
-            constants: group(&pipeline.constants, &[&items, &params]),
+            constants: group(&pipeline.constants, &of_stages.iter().collect::<Vec<_>>()),
             pipeline,
+            name,
             workgroups: [workgroups.min(row) as u32, workgroups.div_ceil(row) as u32],
         })
     }
