@@ -71,26 +71,30 @@ struct OnEdge {
     square: f32,
 }
 
+// The place of corner `a`. An array that is indexed by a variable would be memory.
+fn place(q: array<vec3<f32>, 4>, a: u32) -> vec3<f32> {
+    return select(select(q[0], q[1], a == 1u), select(q[2], q[3], a == 3u), a > 1u);
+}
+
+// A weight for corner `a` alone.
+fn only(a: u32, weight: f32) -> vec4<f32> {
+    return select(vec4<f32>(), vec4<f32>(weight), vec4<u32>(0u, 1u, 2u, 3u) == vec4<u32>(a));
+}
+
 // The closest point of the edge from corner `a` to the next one.
 fn on_edge(q: array<vec3<f32>, 4>, a: u32) -> OnEdge {
-    var places = q;
     let b = (a + 1u) % 4u;
-    let along = places[b] - places[a];
-    let share = min(max(-dot(places[a], along) / dot(along, along), 0.0), 1.0);
-    var weights = vec4<f32>(0.0);
-    weights[a] = 1.0 - share;
-    weights[b] = share;
-    let offset = (along * share + places[a]) * -1.0;
-    return OnEdge(weights, offset, dot(offset, offset));
+    let start = place(q, a);
+    let along = place(q, b) - start;
+    let share = min(max(-dot(start, along) / dot(along, along), 0.0), 1.0);
+    let offset = (along * share + start) * -1.0;
+    return OnEdge(only(a, 1.0 - share) + only(b, share), offset, dot(offset, offset));
 }
 
 // A corner.
 fn on_corner(q: array<vec3<f32>, 4>, a: u32) -> OnEdge {
-    var places = q;
-    var weights = vec4<f32>(0.0);
-    weights[a] = 1.0;
-    let offset = places[a] * -1.0;
-    return OnEdge(weights, offset, dot(offset, offset));
+    let offset = place(q, a) * -1.0;
+    return OnEdge(only(a, 1.0), offset, dot(offset, offset));
 }
 
 // The closest point of a face: the projection of the origin if it lies inside, else the closest point of the nearest edge.

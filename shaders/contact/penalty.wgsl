@@ -26,9 +26,7 @@ struct Rubbed {
 var<private> own: vec3<i32>;
 
 // Adds forces to the corners of a face and their opposite to the force on the point, as integers whose sum is zero.
-fn pull(item: u32, around: Corners, pulled: array<vec3<f32>, 4>) {
-    var pulls = pulled;
-    var places = around.reference;
+fn pull(item: u32, around: Corners, pulls: array<vec3<f32>, 4>) {
     let plane = arrayLength(&forces) / 3u;
     let sum = ((pulls[0] + pulls[1]) + (pulls[2] + pulls[3])) / params.force_quantum;
     let fits = is_finite(sum.x) && is_finite(sum.y) && is_finite(sum.z);
@@ -40,17 +38,19 @@ fn pull(item: u32, around: Corners, pulled: array<vec3<f32>, 4>) {
     var rest = vec3<i32>(to_i32(sum.x), to_i32(sum.y), to_i32(sum.z));
     own = own - rest;
     for (var a = 0u; a < 4u; a++) {
+        let pulled = place(pulls, a);
         var part = rest;
         if a != 3u {
-            let quanta_of = pulls[a] / params.force_quantum;
+            let quanta_of = pulled / params.force_quantum;
             part = vec3<i32>(to_i32(quanta_of.x), to_i32(quanta_of.y), to_i32(quanta_of.z));
         }
         rest = rest - part;
-        for (var k = 0u; k < 3u; k++) {
-            atomicAdd(&forces[around.nodes[a] + k * plane], part[k]);
-        }
+        let node = around.nodes[a];
+        atomicAdd(&forces[node], part.x);
+        atomicAdd(&forces[node + plane], part.y);
+        atomicAdd(&forces[node + 2u * plane], part.z);
 #if PERIODIC
-        add_virial(item, pulls[a], places[a]);
+        add_virial(item, pulled, place(around.reference, a));
 #endif
     }
 }
@@ -89,9 +89,6 @@ fn face_push(here: Point, entry: u32, most: f32, pushed: ptr<function, Pushed>) 
     }
     let gap = point.distance - here.radius;
     let size = here.stiff * max(-gap, 0.0);
-    if size > 0.0 || nearer {
-        (*pushed).last = seen;
-    }
     let alone = !((*pushed).shared_force > 0.0);
     if size > 0.0 || alone && nearer {
         let share = select(1.0, size, size > 0.0);
@@ -100,12 +97,11 @@ fn face_push(here: Point, entry: u32, most: f32, pushed: ptr<function, Pushed>) 
             (*pushed).apart = vec3<f32>(0.0);
             (*pushed).inverse_mass = 0.0;
         }
-        var places = around.reference;
         for (var a = 0u; a < 4u; a++) {
             let node = around.nodes[a];
             let weight = point.weights[a];
             (*pushed).motion = velocity_at(node) * (share * weight) + (*pushed).motion;
-            (*pushed).apart = places[a] * (share * weight) + (*pushed).apart;
+            (*pushed).apart = place(around.reference, a) * (share * weight) + (*pushed).apart;
             (*pushed).inverse_mass = (*pushed).inverse_mass + share * (weight * weight / mass[node]);
         }
         (*pushed).shared_force = (*pushed).shared_force + size;
@@ -193,12 +189,9 @@ fn rub(here: Point, pushed: ptr<function, Pushed>, touch: u32) -> Rubbed {
 
 // Adds the forces of a face on a point to the nodes, with its share of damping and friction.
 fn press(here: Point, entry: u32, pushed: ptr<function, Pushed>, rubbed: Rubbed) {
-    var seen = (*pushed).last;
-    if entry != seen.entry {
-        let again = corners_of(here, entry);
-        seen = see(here, entry, again, patch_of(again.current));
-    }
-    let around = seen.corners;
+    // found again rather than kept, for the sake of registers
+    let around = corners_of(here, entry);
+    let seen = see(here, entry, around, patch_of(around.current));
     let point = seen.point;
     var push = seen.push;
     let is_nearest = entry == (*pushed).nearest.entry;
@@ -233,9 +226,9 @@ fn share_out(here: Point) {
         }
         rest = rest - part;
         let node = carried_by(here.item, a);
-        for (var k = 0u; k < 3u; k++) {
-            atomicAdd(&forces[node + k * plane], part[k]);
-        }
+        atomicAdd(&forces[node], part.x);
+        atomicAdd(&forces[node + plane], part.y);
+        atomicAdd(&forces[node + 2u * plane], part.z);
     }
 }
 
@@ -338,7 +331,6 @@ fn penalty(item: u32) {
             continue;
         }
         var pushed = Pushed();
-        pushed.last.entry = EMPTY;
         least = min(least, look(here, list, first_gap + GAPS, vec2<u32>(start, end), most, &pushed));
         var depth = 0.0;
         if is_behind(&pushed, most) {

@@ -49,7 +49,6 @@ struct Seen {
 // Forces of a body on a point, see the twin.
 struct Pushed {
     nearest: Nearest,
-    last: Seen,
     inside: bool,
     push: vec3<f32>,
     energy: f32,

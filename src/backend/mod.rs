@@ -29,6 +29,8 @@ pub trait Backend {
     fn request(&mut self, buffer: Buffer);
     /// The numbers that were asked for, in order; a device is waited for once.
     fn receive(&mut self) -> Vec<Contents>;
+    /// Brings buffers to the host, waiting for a device once: until the next run or change, reading them needs no further wait.
+    fn bring(&mut self, _buffers: &[Buffer]) {}
     /// Copies the numbers of a buffer to another of the same kind and length.
     fn copy(&mut self, from: Buffer, to: Buffer);
     /// Sets every number of a buffer to zero.

@@ -13,6 +13,7 @@ impl Run<'_> {
     /// A frame for ParaView, and a picture of it. What the rig adds is measured and written at once; the rest is given to the
     /// [writer](super::writer).
     pub(super) fn write_frame(&mut self, name: &str) -> Result<()> {
+        self.simulation.bring_frame();
         let s = &self.simulation;
         let mut frame = s.frame();
         s.alive()?;

@@ -11,6 +11,7 @@ use crate::rigs::observer::{Loading, Seen};
 impl Run<'_> {
     /// Writes one row to every table.
     pub(super) fn write_row(&mut self, phase: &str) -> Result<()> {
+        self.simulation.bring_row();
         let seen = match &self.yarns {
             Some(_) => {
                 let frame = self.simulation.shape();

@@ -117,8 +117,10 @@ impl Simulation {
         let mut record = Record::new();
         self.capacity.record(&mut record);
         self.record(&mut record);
-        let changing = self.changing().into_iter();
-        let buffers = changing.map(|b| (self.model.plan.buffers[b.0].name, self.backend.bytes(b))).collect();
+        let changing = self.changing();
+        self.backend.bring(&changing);
+        let buffers =
+            changing.into_iter().map(|b| (self.model.plan.buffers[b.0].name, self.backend.bytes(b))).collect();
         (record.into_bytes(), buffers)
     }
 

@@ -10,6 +10,22 @@ use crate::settings::integration::Precision;
 use std::hash::Hasher;
 
 impl Simulation {
+    /// Brings to the host what rows of tables are measured from, with one wait for a device.
+    pub fn bring_row(&mut self) {
+        let b = &self.model.buffers;
+        let all = [Some(b.quanta), Some(b.remainder), b.beam_tension, b.reaction];
+        self.backend.bring(&all.into_iter().flatten().collect::<Vec<_>>());
+    }
+
+    /// Brings to the host what a [`frame`](Self::frame) consists of, with one wait for a device.
+    pub fn bring_frame(&mut self) {
+        let b = &self.model.buffers;
+        let faces = b.faces.iter().flatten().flat_map(|faces| [faces.keys, faces.touches]);
+        let of_nodes = [b.quanta, b.remainder, b.velocity];
+        let fields = [b.hex_energy, b.beam_tension].into_iter().chain(b.slip).flatten();
+        self.backend.bring(&of_nodes.into_iter().chain(fields).chain(faces).collect::<Vec<_>>());
+    }
+
     /// Axial force of each beam, N.
     pub fn tensions(&self) -> Vec<f64> {
         self.model.buffers.beam_tension.map_or_else(Vec::new, |b| self.backend.scalars(b))

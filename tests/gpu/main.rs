@@ -4,6 +4,7 @@
 mod common;
 
 mod cell;
+mod dispatches;
 mod scenes;
 mod shaders;
 mod stages;

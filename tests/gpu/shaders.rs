@@ -2,14 +2,12 @@
 //! with the layout that Rust gives them, as naga parses it.
 
 use crate::common::{bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, reduced, with};
-use naga::{AddressSpace, Expression, ScalarKind, StorageAccess, TypeInner};
+use naga::{AddressSpace, ScalarKind, StorageAccess, TypeInner};
 use serde_json::{Value, json};
-use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
 use std::panic::catch_unwind;
 use tricot::kernel::buffer::{Description, Kind};
-use tricot::kernel::dispatch::Dispatch;
 use tricot::kernel::interface::Access;
 use tricot::kernel::row::Row;
 use tricot::kernel::shader::{ENTRY, Text};
@@ -18,11 +16,8 @@ use tricot::run::simulation;
 use tricot::simulate::BackendConfig;
 use tricot::{conditions, contact, dynamics, elements};
 
-/// Largest array, in bytes, that a function may index by a variable.
-const INDEXED: u32 = 64;
-
 /// Scenes that together have every effect, and each effect missing once.
-fn scenes() -> Vec<(&'static str, Value)> {
+pub(super) fn scenes() -> Vec<(&'static str, Value)> {
     let (cell, specimen) = (coarse_cell(), held_specimen());
     let held = json!({ "within": [[-0.1, -0.1, -0.1], [0.1, 1.1, 1.1]], "displacement_mm": [0, 0, 0] });
     let thread = json!({
@@ -226,67 +221,4 @@ fn every_twin_compiles_and_sees_what_its_stage_binds() {
     assert!(unused.is_empty(), "no twin uses {unused:?}");
     assert!(seen.len() == 31, "{} kinds of stages", seen.len());
     assert_eq!(failed, 0, "stages without a twin that fits; see above");
-}
-
-/// The dispatches of each list of stages of each scene.
-fn dispatches(each: impl Fn(&str, &Dispatch)) {
-    for (scene, case) in scenes() {
-        let simulation =
-            simulation(&loaded(&case), BackendConfig::default()).unwrap_or_else(|e| panic!("{scene}: {e}"));
-        let plan = &simulation.model.plan;
-        for stages in [&plan.step, &plan.search, &plan.watch, &plan.diagnose, &plan.collect] {
-            Dispatch::of(stages, 32).iter().for_each(|dispatch| each(scene, dispatch));
-        }
-    }
-}
-
-/// A step has at most six dispatches: hexahedra, light forces, two kinds of contact on faces, and the chain of the nodes.
-#[test]
-fn a_step_has_few_dispatches() {
-    for (scene, case) in scenes() {
-        let simulation =
-            simulation(&loaded(&case), BackendConfig::default()).unwrap_or_else(|e| panic!("{scene}: {e}"));
-        let all = Dispatch::of(&simulation.model.plan.step, 32);
-        let names: Vec<String> = all.iter().map(Dispatch::name).collect();
-        println!("{scene}: {names:?}");
-        // a block may have a law of its own
-        let laws = names.iter().filter(|name| name.starts_with("hex8")).count();
-        assert!(names.len() <= 5 + laws.saturating_sub(1), "{scene}: {names:?}");
-        // a device that binds few buffers takes more, with the same stages
-        let few = Dispatch::of(&simulation.model.plan.step, 16);
-        assert!(few.len() >= all.len() && few.iter().all(|d| d.buffers().len() + d.cuts().iter().len() <= 16));
-        let stages = |all: &[Dispatch]| all.iter().map(|dispatch| dispatch.stages().len()).sum::<usize>();
-        assert_eq!(stages(&few), stages(&all));
-    }
-}
-
-/// Every dispatch compiles, also of several stages, and no function indexes a large array of its own by a variable: a GPU keeps
-/// such an array in memory instead of registers.
-#[test]
-fn dispatches_compile_without_private_arrays() {
-    let largest = RefCell::new(BTreeMap::new());
-    dispatches(|scene, dispatch| {
-        let name = format!("{scene}, {}", dispatch.name());
-        let text = dispatch.text().unwrap_or_else(|e| panic!("{name}: {e}"));
-        let (module, _) = text.module().unwrap_or_else(|e| panic!("{name}: {e}"));
-        let is_array = |ty| matches!(module.types[ty].inner, TypeInner::Array { .. });
-        let mut globals = module.global_variables.iter().map(|(_, variable)| variable);
-        assert!(!globals.any(|v| v.space == AddressSpace::Private && is_array(v.ty)), "{name}");
-        let entries = module.entry_points.iter().map(|entry| &entry.function);
-        for function in module.functions.iter().map(|(_, function)| function).chain(entries) {
-            for (_, expression) in function.expressions.iter() {
-                let Expression::Access { base, .. } = *expression else { continue };
-                let Expression::LocalVariable(local) = function.expressions[base] else { continue };
-                let variable = &function.local_variables[local];
-                let bytes = module.types[variable.ty].inner.size(module.to_ctx());
-                let shown = [&function.name, &variable.name].map(|name| name.clone().unwrap_or_default());
-                largest.borrow_mut().insert((bytes, shown), name.clone());
-            }
-        }
-    });
-    let largest = largest.into_inner();
-    for ((bytes, [function, variable]), dispatch) in largest.iter().rev() {
-        println!("{bytes} bytes: `{variable}` of `{function}` in {dispatch}");
-    }
-    assert!(largest.keys().all(|(bytes, _)| *bytes <= INDEXED), "arrays of more than {INDEXED} bytes");
 }

@@ -404,41 +404,6 @@ fn every_stage_agrees_with_the_cpu_on_every_buffer() {
     assert!(unchanged.is_empty(), "nothing was changed in {unchanged:?}");
 }
 
-/// Stages that share a dispatch leave the same bits as each of them alone.
-#[test]
-fn a_dispatch_of_several_stages_gives_the_bits_of_each_alone() {
-    let Some(device) = device() else { return };
-    for (case, end) in [(coarse_cell(), 2.5e-4), (held_specimen(), 1.2e-4), (free(), 1e-4)] {
-        let mut simulation = run::simulation(&loaded(&case), BackendConfig::default()).unwrap();
-        advance(&mut simulation, end);
-        let plan = &simulation.model.plan;
-        let (time, dt) = (simulation.time(), simulation.dt());
-        let row = Row { affine: 100.0, ..simulation.schedule.row(time, dt, dt, |_| [1.0; 2]) };
-        let after = |alone: bool| {
-            let mut gpu = Gpu::new(Arc::clone(&device), &plan.buffers).unwrap_or_else(|e| panic!("{e}"));
-            for buffer in plan.all() {
-                gpu.set_bytes(buffer, &simulation.backend().bytes(buffer));
-            }
-            for turn in 0..3 {
-                let rows = [Row { turn: f64::from(turn), ..row }];
-                if alone {
-                    plan.step.iter().for_each(|stage| gpu.run(std::slice::from_ref(stage), &rows));
-                } else {
-                    gpu.run(&plan.step, &rows);
-                }
-            }
-            assert_eq!(gpu.fault(), None);
-            (gpu.traffic().unwrap().dispatches, plan.all().map(|buffer| gpu.bytes(buffer)).collect::<Vec<_>>())
-        };
-        let ((many, alone), (few, together)) = (after(true), after(false));
-        assert!(few < many, "{few} and {many} dispatches");
-        for (buffer, (alone, together)) in plan.all().zip(alone.iter().zip(&together)) {
-            let changed = alone.chunks(4).zip(together.chunks(4)).filter(|(a, b)| a != b).count();
-            assert_eq!(changed, 0, "numbers of `{}` that differ", plan.describe(buffer).name);
-        }
-    }
-}
-
 /// The fault found in a buffer that a stage of the coarse cell writes, after a change to some of its numbers.
 fn wrong(stage: &str, buffer: &str, number: impl Fn(usize) -> f64, change: impl FnOnce(&mut [f64])) -> Option<String> {
     static MODEL: LazyLock<Model> = LazyLock::new(|| {

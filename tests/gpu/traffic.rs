@@ -64,3 +64,28 @@ fn bursts_and_searches_are_waited_for_once() {
         assert!(traffic.waits <= bursts + searches, "{name}: {traffic:?} in {steps} steps with {searches} searches");
     }
 }
+
+/// A row of tables waits for the device once, a frame of the same state once more, a snapshot once. Nothing is read from a state
+/// that has changed since.
+#[test]
+fn rows_frames_and_snapshots_are_waited_for_once() {
+    let Some(device) = device() else { return };
+    let mut scene = start(&coarse_cell(), device);
+    spent(&mut scene, 2e-5);
+    let waits = |scene: &Simulation| scene.backend().traffic().unwrap().waits;
+    let before = waits(&scene);
+    scene.bring_row();
+    let (shape, tensions) = (scene.shape(), scene.tensions());
+    scene.reactions();
+    assert_eq!(waits(&scene) - before, 1);
+    scene.bring_frame();
+    let frame = scene.frame();
+    assert_eq!(waits(&scene) - before, 2);
+    assert_eq!(frame.positions, shape.positions);
+    scene.snapshot();
+    assert_eq!(waits(&scene) - before, 3);
+    spent(&mut scene, 3e-5);
+    scene.bring_row();
+    assert_ne!(scene.shape().positions, shape.positions);
+    assert_ne!(scene.tensions(), tensions);
+}

@@ -67,6 +67,8 @@ struct Work {
     clock: Option<Clock>,
     times: Vec<Time>,
     requested: Vec<Staged>,
+    /// Bytes of buffers that nothing has changed since they were read, by number.
+    brought: HashMap<usize, Vec<u8>>,
     /// Staging buffers that are not in use.
     free: Vec<wgpu::Buffer>,
     /// When the host last received numbers, the rows recorded since then, and the time of a row over the time before, s.
@@ -74,6 +76,14 @@ struct Work {
     since: u64,
     pace: f64,
     traffic: Traffic,
+}
+
+impl Work {
+    /// Notes that commands are recorded which may change any buffer.
+    fn changes(&mut self) {
+        self.recorded = true;
+        self.brought.clear();
+    }
 }
 
 impl Gpu {
@@ -146,6 +156,7 @@ impl Gpu {
                 clock,
                 times: Vec::new(),
                 requested: Vec::new(),
+                brought: HashMap::new(),
                 free: Vec::new(),
                 received: Instant::now(),
                 since: 0,
@@ -255,7 +266,7 @@ impl Backend for Gpu {
                 place[..size_of::<Row<f32>>()].copy_from_slice(bytemuck::bytes_of(&row.cast::<f32>()));
             }
             self.device.queue.write_buffer(&self.rows, first, &bytes);
-            work.recorded = true;
+            work.changes();
             work.rows += now.len() as u64;
             work.since += now.len() as u64;
             let offsets: Vec<u32> = (0..now.len() as u64).map(|i| (first + i * ROW_STRIDE) as u32).collect();
@@ -306,7 +317,7 @@ impl Backend for Gpu {
     fn copy(&mut self, from: Buffer, to: Buffer) {
         let work = &mut *self.work.borrow_mut();
         work.encoder.copy_buffer_to_buffer(&self.buffers[from.0], 0, &self.buffers[to.0], 0, None);
-        work.recorded = true;
+        work.changes();
     }
 
     fn clear(&mut self, buffer: Buffer) {
@@ -317,16 +328,27 @@ impl Backend for Gpu {
         let work = &mut *self.work.borrow_mut();
         let (from, bytes) = (4 * numbers.start as u64, 4 * numbers.len() as u64);
         work.encoder.clear_buffer(&self.buffers[buffer.0], from, Some(bytes));
-        work.recorded = true;
+        work.changes();
     }
 
     fn bytes(&self, buffer: Buffer) -> Vec<u8> {
+        if let Some(bytes) = self.work.borrow().brought.get(&buffer.0) {
+            return bytes.clone();
+        }
         self.land(vec![self.stage(buffer)]).pop().unwrap_or_default()
+    }
+
+    fn bring(&mut self, buffers: &[Buffer]) {
+        let missing: Vec<Buffer> =
+            buffers.iter().copied().filter(|b| !self.work.borrow().brought.contains_key(&b.0)).collect();
+        let landed = self.land(missing.iter().map(|buffer| self.stage(*buffer)).collect());
+        self.work.borrow_mut().brought.extend(missing.into_iter().map(|buffer| buffer.0).zip(landed));
     }
 
     fn set_bytes(&mut self, buffer: Buffer, bytes: &[u8]) {
         // a write would overtake everything recorded but not submitted
         self.flush();
+        self.work.borrow_mut().brought.remove(&buffer.0);
         self.device.queue.write_buffer(&self.buffers[buffer.0], 0, bytes);
     }
 
@@ -352,7 +374,7 @@ impl Backend for Gpu {
         for (buffer, copy) in &self.saved {
             work.encoder.copy_buffer_to_buffer(copy, 0, &self.buffers[buffer.0], 0, None);
         }
-        work.recorded = true;
+        work.changes();
     }
 
     fn fault(&self) -> Option<String> {
