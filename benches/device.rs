@@ -1,5 +1,6 @@
 //! Cost of a step on a GPU: microseconds per step, hexahedra per second, the time of each stage by the device's own clock and its
-//! distance from the performance limits of the device, and what the host asks of the device. One scene per run:
+//! distance from the performance limits of the device, what the host asks of the device, the time of a row of tables and of a frame,
+//! and the distance from the CPU after some more steps. One scene per run:
 //! `cargo bench --bench device -- WARPS WEFTS` is a sheet of the cell (2 4: the 10 × 10 mm cell; 6 12: 30 × 30 mm; 20 40:
 //! 100 × 100 mm), `cargo bench --bench device -- CASE` the beginning of a case. The last line is the table as JSON. `--adapter NAME`
 //! takes an adapter by a part of its name, `--steps COUNT` times another number of steps.
@@ -10,17 +11,18 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::time::Instant;
 use tricot::backend::gpu::Device;
-use tricot::kernel::shader::{ENTRY, Text};
+use tricot::kernel::shader::{ENTRY, Text, WORKGROUP};
 use tricot::kernel::stage::Stage;
 use tricot::rigs::read::{Loaded, read};
 use tricot::run::simulation;
 use tricot::simulate::{BackendConfig, Simulation};
 
 /// A quick pretension, so that contact is as busy as in most of a run, and the start of timing, s.
-const QUICK: [&str; 2] = ["steps.0.pretension.time_s=1e-4", "steps.1.stretch.time_s=5e-5"];
-const START: f64 = 1.6e-4;
-/// Number of timed steps.
+const QUICK: [&str; 2] = ["steps.0.pretension.time_s=6e-4", "steps.1.stretch.time_s=5e-5"];
+const START: f64 = 6.6e-4;
+/// Number of timed steps, and of steps after which positions are compared with the CPU.
 const STEPS: u64 = 1024;
+const PARITY: u64 = 64;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
@@ -79,13 +81,17 @@ fn main() {
         stages.insert(name, json!({ "us": 1e6 * spent, "floor_us": floor.map(|floor| 1e6 * floor) }));
     }
     println!("between dispatches: {:.0} % of the step", 100.0 * (1.0 - sum / step));
+    let [row, frame] = [seen(&mut sheet, Simulation::bring_row), seen(&mut sheet, Simulation::bring_frame)];
+    println!("on the host: what a row of tables needs in {:.2} ms, a frame in {:.2} ms", 1e3 * row, 1e3 * frame);
+    let apart = apart(&mut sheet, &loaded);
+    println!("{PARITY} steps later, nodes are at most {apart:.1e} mm from where the CPU has them");
     let adapter = device.listed();
     let table = json!({
         "scene": scene, "adapter": adapter.name, "driver": adapter.driver, "interface": adapter.interface, "hexes": hexes,
         "beams": beams, "nodes": nodes, "steps": steps, "us_per_step": 1e6 * step, "hexes_per_s": hexes as f64 / step,
         "recording_us_per_step": recording, "waiting_us_per_step": waiting, "dispatches_per_step": dispatches,
         "submissions_per_1000_steps": submissions, "waits_per_1000_steps": waits, "searches_per_1000_steps": found,
-        "bytes_read_per_1000_steps": bytes, "device_bytes_per_s": rates.bytes, "device_operations_per_s": rates.operations,
+        "bytes_read_per_1000_steps": bytes, "row_s": row, "frame_s": frame, "mm_from_cpu": apart, "device_bytes_per_s": rates.bytes, "device_operations_per_s": rates.operations,
         "stages": stages
     });
     println!("{table}");
@@ -105,6 +111,28 @@ fn chosen(arguments: &[String]) -> (String, Loaded) {
     (format!("sheet of {warps} × {wefts}"), loaded)
 }
 
+/// Seconds until the host has what it asks for and the positions computed from it.
+fn seen(sheet: &mut Simulation, bring: impl Fn(&mut Simulation)) -> f64 {
+    let started = Instant::now();
+    bring(sheet);
+    std::hint::black_box(sheet.shape());
+    started.elapsed().as_secs_f64()
+}
+
+/// Largest distance of a node from where the CPU has it, mm, after both go on from the same state.
+fn apart(sheet: &mut Simulation, loaded: &Loaded) -> f64 {
+    let mut host = simulation(loaded, BackendConfig::default()).unwrap_or_else(|e| panic!("{e}"));
+    let (record, buffers) = sheet.snapshot();
+    let sizes: Vec<(String, usize)> = buffers.iter().map(|(name, bytes)| ((*name).into(), bytes.len())).collect();
+    let contents: Vec<Vec<u8>> = buffers.into_iter().map(|(_, bytes)| bytes).collect();
+    host.restore(record, &sizes, &contents).unwrap_or_else(|e| panic!("{e}"));
+    let until = sheet.time() + PARITY as f64 * sheet.dt();
+    [&mut *sheet, &mut host].into_iter().for_each(|scene| go(scene, until));
+    let (ours, theirs) = (sheet.fluctuations(), host.fluctuations());
+    let far = |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max);
+    ours.iter().zip(&theirs).map(far).fold(0.0, f64::max)
+}
+
 fn go(sheet: &mut Simulation, until: f64) {
     sheet.advance(until, |_| false).unwrap_or_else(|e| panic!("{e}"));
 }
@@ -115,7 +143,7 @@ fn floor(sheet: &Simulation, stage: &Stage, bytes_per_s: f64, operations_per_s: 
         stage.reads().iter().chain(stage.writes().iter().map(|(b, _)| b)).map(|b| b.number()).collect();
     let written: usize = stage.writes().iter().map(|(b, _)| sheet.model.plan.describe(*b).len).sum();
     let bytes = 4 * (buffers.iter().map(|b| sheet.model.plan.buffers[*b].len).sum::<usize>() + written);
-    let invocations = stage.items().len() * stage.kernel().shader.share.invocations();
+    let invocations = WORKGROUP * stage.kernel().shader.share.workgroups(stage.items().len());
     let operations = operations(stage) * invocations as f64;
     (bytes as f64 / bytes_per_s).max(operations / operations_per_s)
 }

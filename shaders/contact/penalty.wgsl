@@ -272,21 +272,21 @@ fn settle(here: Point, body: u32, depth: f32, pushed: ptr<function, Pushed>, rub
     return true;
 }
 
-fn penalty(item: u32) {
-    let faces_listed = bound(params.faces, arrayLength(&near));
-    let first = (MADE + params.faces) * nodes[CARRIED * item + CARRIED - 1u];
-    let full_radius = points[POINT * item + 5u];
-    var size = 0.0;
-    for (var a = 0u; a < CARRIED_BY; a++) {
-        size = size + abs(points[POINT * item + a]);
-    }
+// Distance by which bodies and a point can have approached since the step before, mm.
+fn closing_of(item: u32) -> f32 {
     let elapsed = row.dt_mid + row.dt_mid - row.dt;
     var motion = vec3<f32>(0.0);
     for (var a = 0u; a < CARRIED_BY; a++) {
         motion = velocity_at(carried_by(item, a)) * points[POINT * item + a] + motion;
     }
     let speed = norm(motion) + speed_of(0u) + row.affine;
-    let closing = row.closing * speed * elapsed + full_radius * row.radius_increment;
+    return row.closing * speed * elapsed + points[POINT * item + 5u] * row.radius_increment;
+}
+
+// Whether a point looks at faces; if not, its bound of the gaps is reduced.
+fn walks(item: u32) -> bool {
+    let faces_listed = bound(params.faces, arrayLength(&near));
+    let first = (MADE + params.faces) * nodes[CARRIED * item + CARRIED - 1u];
     let first_gap = (GAPS + params.faces) * item;
     let made = (MADE + params.slots) * item;
     if row.searched > 0.0 && keys[made] != near[first] {
@@ -298,10 +298,25 @@ fn penalty(item: u32) {
         }
         gaps[first_gap + INNER] = inner;
     }
-    let closed = gaps[first_gap + CLOSED] + closing;
+    let closed = gaps[first_gap + CLOSED] + closing_of(item);
     if closed < gaps[first_gap + LEAST] {
         gaps[first_gap + CLOSED] = closed;
-        return;
+        return false;
+    }
+    return true;
+}
+
+// Forces on a point that looks at faces; whether it touches any.
+fn push_point(item: u32) -> bool {
+    let faces_listed = bound(params.faces, arrayLength(&near));
+    let first = (MADE + params.faces) * nodes[CARRIED * item + CARRIED - 1u];
+    let first_gap = (GAPS + params.faces) * item;
+    let closing = closing_of(item);
+    let closed = gaps[first_gap + CLOSED] + closing;
+    let full_radius = points[POINT * item + 5u];
+    var size = 0.0;
+    for (var a = 0u; a < CARRIED_BY; a++) {
+        size = size + abs(points[POINT * item + a]);
     }
     let stiff = points[POINT * item + 4u];
     let radius = full_radius * row.radius;
@@ -354,8 +369,35 @@ fn penalty(item: u32) {
     if any(own != vec3<i32>(0)) {
         share_out(here);
     }
-    if touching {
-        atomicAdd(&status[TOUCHING + KIND], 1u);
+    return touching;
+}
+
+// The points of the workgroup that look at faces, and how many of them touch.
+var<workgroup> walking: array<u32, ITEM_SHARES>;
+var<workgroup> walkers: atomic<u32>;
+var<workgroup> touchers: atomic<u32>;
+
+fn penalty(first: u32, count: u32, local: u32) {
+    if local == 0u {
+        atomicStore(&walkers, 0u);
+        atomicStore(&touchers, 0u);
+    }
+    workgroupBarrier();
+    for (var i = local; i < count; i += WORKGROUP) {
+        if walks(first + i) {
+            walking[atomicAdd(&walkers, 1u)] = first + i;
+        }
+    }
+    workgroupBarrier();
+    let most = atomicLoad(&walkers);
+    for (var i = local; i < most; i += WORKGROUP) {
+        if push_point(walking[i]) {
+            atomicAdd(&touchers, 1u);
+        }
+    }
+    workgroupBarrier();
+    if local == 0u && atomicLoad(&touchers) > 0u {
+        atomicAdd(&status[TOUCHING + KIND], atomicLoad(&touchers));
     }
 }
 #endif

@@ -27,7 +27,14 @@ fn stage(group: u32, local: u32) {
     if group < items.count * ITEM_SHARES {
         KERNEL(items.first * ITEM_SHARES + group, local);
     }
-#else
+#endif
+#if PICKS
+    let first = group * ITEM_SHARES;
+    if first < items.count {
+        KERNEL(items.first + first, min(items.count - first, ITEM_SHARES), local);
+    }
+#endif
+#if INVOCATIONS
     let number = group * WORKGROUP + local;
     if number < items.count * ITEM_SHARES {
         KERNEL(items.first * ITEM_SHARES + number);
@@ -35,12 +42,10 @@ fn stage(group: u32, local: u32) {
 #endif
 }
 
-// Workgroups of the stage.
+// Workgroups of a stage whose invocations work alone.
+#if INVOCATIONS
 fn stage_workgroups() -> u32 {
-#if WORKGROUPS
-    return items.count * ITEM_SHARES;
-#else
     return (items.count * ITEM_SHARES + WORKGROUP - 1u) / WORKGROUP;
-#endif
 }
+#endif
 #endif

@@ -24,7 +24,7 @@ use crate::kernel::node::{Displacements, Field, Lattice};
 use crate::kernel::position;
 use crate::kernel::row::Row;
 use crate::kernel::scratch;
-use crate::kernel::shader::{Shader, when};
+use crate::kernel::shader::{Shader, Share, when};
 
 use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{fma, norm};
@@ -57,6 +57,9 @@ const SLOTS: [Slot; 16] = [
 
 /// Contact forces of points of threads (`THREAD`) or of nodes of yarn surfaces on yarns.
 pub struct Penalty<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool>;
+
+/// Points from which a workgroup picks those that look at faces: about half of them do, so that one round is enough.
+const PICKED: usize = 128;
 
 /// Index of the kind of points in the status.
 const fn kind(threads: bool) -> usize {
@@ -326,6 +329,7 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for 
             &sums::shared(FRICTION, PERIODIC),
             &shared(kind(THREAD), FRICTION),
         ],
+        share: Share::Picks(PICKED),
         ..Shader::new("contact/penalty", "penalty")
     };
     const SLOTS: &'static [Slot] = &SLOTS;

@@ -135,7 +135,7 @@ impl<'a> Dispatch<'a> {
 
     /// Number of workgroups.
     pub fn workgroups(&self) -> usize {
-        let of_stage = |stage: &&Stage| (stage.count * stage.kernel.shader.share.invocations()).div_ceil(WORKGROUP);
+        let of_stage = |stage: &&Stage| stage.kernel.shader.share.workgroups(stage.count);
         match self.cuts() {
             Some(cuts) => cuts.len() / self.stages.len() - 1,
             None => self.stages.iter().map(of_stage).sum(),

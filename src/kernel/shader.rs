@@ -2,7 +2,7 @@
 //!
 //! A twin has the path and the function names of its Rust file and repeats the same statements for one item. A kernel is a
 //! function of an item number (or of the share of an item, if several invocations work on it), or of a share and the invocation
-//! number if a workgroup works on it. Its text starts with the constants and bindings that Rust declares for it (see
+//! number if a workgroup works on it, or of the first of several items, their count and the invocation number. Its text starts with the constants and bindings that Rust declares for it (see
 //! [`super::interface`]; only the constants that it uses), and ends with `kernel/stage`, which passes the items of a workgroup
 //! to it. [`super::dispatch`] adds the entry point. Lines that begin with `#` direct the composition:
 //!
@@ -52,21 +52,24 @@ pub struct Shader {
     pub constants: &'static [&'static [Constant]],
 }
 
-/// Number of invocations or workgroups per item of a stage.
+/// How the items of a stage are shared by invocations and workgroups.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Share {
-    /// This number of invocations.
+    /// This number of invocations for an item.
     Invocations(usize),
-    /// This number of workgroups.
+    /// This number of workgroups for an item.
     Workgroups(usize),
+    /// A workgroup for this number of items, whose work differs: all of it picks those with work, and shares them.
+    Picks(usize),
 }
 
 impl Share {
-    /// Invocations per item.
-    pub fn invocations(self) -> usize {
+    /// Number of workgroups for so many items.
+    pub fn workgroups(self, items: usize) -> usize {
         match self {
-            Self::Invocations(count) => count,
-            Self::Workgroups(count) => count * WORKGROUP,
+            Self::Invocations(count) => (items * count).div_ceil(WORKGROUP),
+            Self::Workgroups(count) => items * count,
+            Self::Picks(count) => items.div_ceil(count),
         }
     }
 }
@@ -120,8 +123,9 @@ impl Text {
     pub(super) fn part(stage: &Stage, link: Option<[usize; 2]>) -> Result<Self> {
         let shader = stage.kernel.shader;
         let (shares, of_workgroups): (_, &[_]) = match shader.share {
-            Share::Invocations(count) => (count, &[]),
+            Share::Invocations(count) => (count, &["INVOCATIONS"]),
             Share::Workgroups(count) => (count, &["WORKGROUPS"]),
+            Share::Picks(count) => (count, &["PICKS"]),
         };
         let of_chain: &[_] = if link.is_some() { &["CHAIN"] } else { &[] };
         let mut composer = Composer {
