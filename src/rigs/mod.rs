@@ -4,12 +4,16 @@
 //! program that distinguishes the rigs.
 
 pub mod bias_extension;
+mod cantilever;
 pub mod cell;
 mod check;
+mod constituents;
 mod crossings;
 pub mod inline;
 pub mod observer;
 pub mod read;
+mod thread_tension;
+mod yarn_shear;
 
 use crate::case::Case;
 use crate::case::domain::Domain;
@@ -79,6 +83,9 @@ pub fn of(domain: &Domain) -> &dyn Rig {
     match domain {
         Domain::Cell(cell) => cell,
         Domain::Specimen(specimen) => specimen,
+        Domain::ThreadTension(tension) => tension,
+        Domain::Cantilever(cantilever) => cantilever,
+        Domain::YarnShear(shear) => shear,
         Domain::Mesh(inline) => inline,
     }
 }
@@ -88,6 +95,9 @@ pub fn of_mut(domain: &mut Domain) -> &mut dyn Rig {
     match domain {
         Domain::Cell(cell) => cell,
         Domain::Specimen(specimen) => specimen,
+        Domain::ThreadTension(tension) => tension,
+        Domain::Cantilever(cantilever) => cantilever,
+        Domain::YarnShear(shear) => shear,
         Domain::Mesh(inline) => inline,
     }
 }

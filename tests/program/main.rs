@@ -5,6 +5,7 @@ mod common;
 
 mod bad_cases;
 mod checkpoint;
+mod constituents;
 mod decks;
 mod faults;
 mod fuzz;

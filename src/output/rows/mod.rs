@@ -3,6 +3,7 @@
 //! Writing and reading use the same type, so each column is declared once. Tables whose columns depend on the scene
 //! (`energies.csv`, `probes.csv`) have no row type; they are [`Named`](super::table::Named).
 
+mod cantilever;
 mod contacts;
 mod crossings;
 mod history;
@@ -14,6 +15,7 @@ mod yarns;
 mod yarns_each;
 mod zones;
 
+pub use cantilever::Cantilever;
 pub use contacts::Contacts;
 pub use crossings::Crossing;
 pub use history::History;

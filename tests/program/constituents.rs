@@ -1,0 +1,75 @@
+//! Tests of the constituents: the program evaluates them as an experimenter would, and recovers what was put in.
+
+use crate::common::options;
+use serde_json::{Value, json};
+use std::fs;
+use std::path::Path;
+use tricot::rigs::read::read;
+use tricot::run::{Options, run};
+use tricot::settings::integration::Precision;
+
+/// The summary of a shipped case with changes, in a precision.
+fn summary(case: &str, sets: &[&str], precision: Precision) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let sets: Vec<String> = sets.iter().chain(&["output.pictures=false"]).map(|set| set.to_string()).collect();
+    let loaded = read(Path::new(&format!("cases/{case}.json")), &sets).unwrap_or_else(|e| panic!("{e}"));
+    let options = Options { precision: Some(precision), ..options(folder.path().join("run"), 1) };
+    run(&loaded, &options).unwrap_or_else(|e| panic!("{e}"));
+    let text = fs::read_to_string(folder.path().join("run/summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&text).unwrap();
+    let balance = summary["worst_energy_balance"].as_f64().unwrap();
+    assert!(balance < 0.02, "{case}: balance {balance}");
+    println!("{case} {sets:?} {precision:?}: {}", summary["property"]);
+    summary
+}
+
+/// The property as evaluated over the one put in, less 1.
+fn error(summary: &Value) -> f64 {
+    let [evaluated, given] = ["evaluated", "given"].map(|name| summary["property"][name].as_f64().unwrap());
+    evaluated / given - 1.0
+}
+
+/// F = E A ΔL/L holds exactly; what is left is inertia.
+#[test]
+fn a_pulled_thread_gives_its_modulus() {
+    for precision in [Precision::F32, Precision::F64] {
+        let summary = summary("thread_tension", &[], precision);
+        assert_eq!(summary["property"]["given"], json!(350.0));
+        assert!(error(&summary).abs() < 5e-4, "{}", error(&summary));
+    }
+}
+
+/// The bent thread is a heavy elastica: the error falls with the square of the beams. Eq. 9 overestimates the stiffness.
+#[test]
+fn a_bent_thread_gives_its_bending_stiffness() {
+    let at = |elements: &str, precision| {
+        let elements = format!("domain.cantilever.elements={elements}");
+        summary("cantilever", &[&elements, "output.rows_per_step=10"], precision)
+    };
+    let [coarse, middle, fine] = ["11", "22", "44"].map(|elements| at(elements, Precision::F32));
+    let [coarse, middle, last] = [&coarse, &middle, &fine].map(error);
+    println!("{coarse} {middle} {last}");
+    assert!((3.0..5.0).contains(&(coarse / middle)) && (3.0..5.0).contains(&(middle / last)));
+    assert!(last.abs() < 2e-3);
+    assert!((error(&at("44", Precision::F64)) - last).abs() < 1e-3);
+    let by_equation = fine["bending_by_eq_9_n_mm2"].as_f64().unwrap() / fine["property"]["evaluated"].as_f64().unwrap();
+    assert!((1.04..1.08).contains(&by_equation), "{by_equation}");
+}
+
+/// The free ends of the fibres carry less, by the same force in a yarn of any length: the difference of two lengths gives K_sh.
+#[test]
+fn a_sheared_yarn_gives_its_shear_stiffness() {
+    for precision in [Precision::F32, Precision::F64] {
+        let at = |length: f64| {
+            let length_mm = format!("domain.yarn_shear.length_mm={length}");
+            let summary = summary("yarn_shear", &[&length_mm, "output.rows_per_step=10"], precision);
+            assert_eq!(summary["property"]["given"], json!(2.2));
+            (1.0 + error(&summary)) * length
+        };
+        let [short, long] = [60.0, 120.0].map(at);
+        let whole = (long - short) / 60.0 - 1.0;
+        println!("{precision:?}: {whole:.2e} by two lengths, {:.2e} by one", long / 120.0 - 1.0);
+        assert!(whole.abs() < 5e-3, "{whole}");
+        assert!(long < 120.0 && short < 60.0, "free ends do not stiffen");
+    }
+}
