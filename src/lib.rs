@@ -53,9 +53,9 @@
 //! | [`case`] | user input: typed JSON with units, ranges, defaults, schema and overrides |
 //! | [`fabric`] | geometry from the parameters of a fabric: yarn sections, the path of the stitch, a cell, a cut piece |
 //! | [`output`] | frames, tables, maps, pictures, pages, checkpoints |
-//! | [`rigs`] | test rigs: the cell, bias extension, inline meshes; what each checks, builds, measures and reports |
+//! | [`rigs`] | test rigs: cell, bias extension, thread, yarn, inline mesh; what each checks, builds, measures and reports |
 //! | [`run`] | a case with its files, as the program runs it |
-//! | [`study`] | many runs at once: tables over a folder of scenes, how results differ, what accuracy costs |
+//! | [`study`] | many runs at once: the tests of a fabric, tables over a folder of scenes, how results differ, what accuracy costs |
 //!
 //! Imports point one way: a module uses only the modules before it in this list (`tests/program/structure.rs` checks it).
 //! ```text
@@ -96,6 +96,7 @@
 //!   name for `#if` in their twins, a name and how to turn it off in [`run::effects`], a scene with and without it in `tests/physics/effects.rs`.
 //! - **A measure**: a file in `measure`, from [`mesh::Mesh`] and [`mesh::frame::Frame`]; a column in [`output::rows`].
 //! - **A test rig**: a folder in [`rigs`] with `impl Rig`, its piece of fabric in [`case::domain`], an arm in [`rigs::of`] and [`rigs::of_mut`].
+//! - **A test of a characterisation**: a row in `study::characterise::parts`.
 //! - **A knob of accuracy**: a row in [`study::accuracy::variations`].
 //! - **A scene**: a JSON file in `cases/`. `tricot schema` lists every field.
 

@@ -6,6 +6,7 @@ use tricot::error::Result;
 use tricot::rigs::read::{Loaded, read};
 use tricot::run;
 use tricot::settings::integration::Precision;
+use tricot::study::characterise;
 
 /// Explicit finite elements for dry stitched non-crimp fabrics at the scale of their yarns.
 #[derive(Parser)]
@@ -24,6 +25,7 @@ Examples:
   tricot picture results/cell
   tricot report results/cell
   tricot compare results/cell results/other_way
+  tricot characterise cases/fabrics/px35.json
   tricot study accuracy cases/unit_cell_shear.json
   tricot study stability cases/hard
   tricot study effects cases/unit_cell_shear.json --only friction --set steps.2.shear.angle_deg=10
@@ -124,6 +126,34 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Run the tests that describe a fabric, and put what they give on one page. The same command goes on with tests that were
+    /// stopped.
+    Characterise {
+        /// The fabric, a JSON file
+        #[arg(value_name = "FABRIC")]
+        fabric: PathBuf,
+        /// Change a value of the fabric; may be repeated, e.g. fabric.stitch.thermal_strain=-0.1
+        #[arg(long, value_name = "PATH=VALUE")]
+        set: Vec<String>,
+        /// quick: coarse meshes of the fabric and no specimen; full: the shipped meshes and a small specimen
+        #[arg(long, default_value = "quick")]
+        preset: Preset,
+        /// Run only these tests, e.g. shear,warp-tension
+        #[arg(long, value_name = "TESTS", value_delimiter = ',')]
+        only: Vec<String>,
+        /// Folder of the tests [default: results/<name of the fabric>-characterise]
+        #[arg(short, long, value_name = "DIR")]
+        output: Option<PathBuf>,
+        /// Machine that runs the tests
+        #[arg(long, default_value = "auto")]
+        backend: Machine,
+        /// Number of threads [default: all cores]
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+        threads: Option<u16>,
+        /// No progress display
+        #[arg(short, long)]
+        quiet: bool,
+    },
     /// Run many cases and put them into one table.
     Study {
         #[command(subcommand)]
@@ -223,6 +253,22 @@ pub enum StudyCommand {
         #[arg(long)]
         confirm: bool,
     },
+}
+
+/// How much time a characterisation takes.
+#[derive(Clone, Copy, ValueEnum)]
+pub enum Preset {
+    Quick,
+    Full,
+}
+
+impl From<Preset> for characterise::Preset {
+    fn from(preset: Preset) -> Self {
+        match preset {
+            Preset::Quick => Self::Quick,
+            Preset::Full => Self::Full,
+        }
+    }
 }
 
 #[derive(clap::Args)]

@@ -10,6 +10,7 @@ use tricot::output::directory;
 use tricot::output::picture::View;
 use tricot::run;
 use tricot::study::accuracy::{self, accuracy};
+use tricot::study::characterise::{self, characterise};
 use tricot::study::compare::compare;
 use tricot::study::effects::{self, effects};
 use tricot::study::stability::stability;
@@ -18,6 +19,7 @@ use tricot::study::step::step;
 /// Exit codes in addition to those of errors.
 pub const UNEXPECTED: u8 = 1;
 pub const BAD_INPUT: u8 = 2;
+const STOPPED: u8 = 3;
 const INTERRUPTED: u8 = 130;
 
 /// Output of a command for the terminal.
@@ -67,6 +69,19 @@ pub fn perform(command: Command) -> Result<Done> {
             let comparison = compare(&a, &b)?;
             output.map_or(Ok(()), |path| comparison.write(&path))?;
             if json { format!("{:#}", comparison.json()) } else { comparison.text() }
+        }
+        Command::Characterise { fabric, set, preset, only, output, backend, threads, quiet } => {
+            let options = characterise::Options {
+                output: output.unwrap_or_else(|| beside(&fabric, "-characterise")),
+                preset: preset.into(),
+                only,
+                machine: backend.into(),
+                threads: threads.map(usize::from),
+                quiet,
+            };
+            let found = characterise(&fabric, &set, &options)?;
+            let code = if found.interrupted { INTERRUPTED } else { u8::from(found.stopped.is_some()) * STOPPED };
+            return Ok(Done { text: found.text, code });
         }
         Command::Study { study: StudyCommand::Accuracy { case, output, points, backend, threads, quiet } } => {
             let options = accuracy::Options {

@@ -41,6 +41,29 @@ pub fn read(path: &Path, overrides: &[String]) -> Result<Loaded> {
     checked(value, provenance, &schema)
 }
 
+/// Reads a case from a text with a fabric from a file in place of its own, and applies the overrides; `name` stands for its file in
+/// messages.
+///
+/// # Errors
+/// As of [`read`].
+pub fn of_fabric(name: &str, case: &str, fabric: &Path, overrides: &[String]) -> Result<Loaded> {
+    let provenance = Provenance { case: name.into(), fabric: Some(fabric.into()), ..Provenance::default() };
+    let mut value = parse::parse(case).map_err(|fault| provenance.error("", fault.to_string()))?;
+    value["fabric"] = parse::file(fabric)?;
+    overridden(value, provenance, overrides)
+}
+
+/// Applies overrides to a value with inline fabric, and checks it.
+fn overridden(mut value: Value, mut provenance: Provenance, overrides: &[String]) -> Result<Loaded> {
+    let schema = schema::case();
+    for text in overrides {
+        let set = Override::read(text)?;
+        set.apply(&mut value, &schema)?;
+        provenance.overrides.push(set);
+    }
+    checked(value, provenance, &schema)
+}
+
 /// Checks a JSON value with inline fabric as if it were a case file.
 ///
 /// # Errors

@@ -5,6 +5,7 @@
 //! by one.
 
 pub mod accuracy;
+pub mod characterise;
 pub mod compare;
 pub mod difference;
 pub mod effects;

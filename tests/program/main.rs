@@ -4,6 +4,7 @@
 mod common;
 
 mod bad_cases;
+mod characterise;
 mod checkpoint;
 mod constituents;
 mod decks;

@@ -1,0 +1,121 @@
+//! The tests of a characterisation. Each is a shipped case with a few changes.
+
+/// A test.
+pub(super) struct Part {
+    /// Name of its folder.
+    pub name: &'static str,
+    /// Title on the page.
+    pub title: &'static str,
+    case: &'static str,
+    /// Changes to the case, as of `--set`.
+    changes: &'static [&'static str],
+    /// Changes that make a coarse, quick test of it.
+    quick: &'static [&'static str],
+    /// Whether a quick characterisation leaves it out.
+    pub is_long: bool,
+    /// Its curve.
+    pub curve: Curve,
+}
+
+/// The curve of a test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Curve {
+    /// F_nor over the shear angle.
+    Shear,
+    /// Membrane force over the stretch of the warps or the wefts.
+    Tension { of_warp: bool },
+    /// None; its property is a number.
+    Property,
+}
+
+const CELL: &str = include_str!("../../../cases/unit_cell_shear.json");
+const SPECIMEN: &str = include_str!("../../../cases/bias_extension_small.json");
+const THREAD: &str = include_str!("../../../cases/thread_tension.json");
+const CANTILEVER: &str = include_str!("../../../cases/cantilever.json");
+const YARN: &str = include_str!("../../../cases/yarn_shear.json");
+
+const PREVIEW: &[&str] = &["accuracy=preview"];
+
+/// A test of a constituent, which is quick anyway.
+const fn of_constituent(
+    name: &'static str,
+    title: &'static str,
+    case: &'static str,
+    changes: &'static [&'static str],
+) -> Part {
+    Part { name, title, case, changes, quick: &[], is_long: false, curve: Curve::Property }
+}
+
+/// All tests, in the order in which they run.
+pub(super) const PARTS: &[Part] = &[
+    of_constituent("thread-tension", "Tension of the thread", THREAD, &[]),
+    of_constituent("thread-bending", "Thread under its own weight", CANTILEVER, &[]),
+    of_constituent("warp-shear", "Longitudinal shear of a warp", YARN, &[]),
+    of_constituent(
+        "weft-shear",
+        "Longitudinal shear of a weft",
+        YARN,
+        &["domain.yarn_shear.ply=weft", r#"resolution={ "weft_columns": 6, "slice_mm": 1 }"#],
+    ),
+    Part {
+        name: "shear",
+        title: "Shear of the fabric and back",
+        case: CELL,
+        changes: &[r#"steps=[{ "pretension": { "time_s": 3e-3 } },
+            { "stretch": { "warp": "corner_driven", "weft": "corner_driven", "time_s": 0.5e-3 } },
+            { "shear": { "angle_deg": 45, "time_s": 13e-3 } }, { "shear": { "angle_deg": 0, "time_s": 13e-3 } }]"#],
+        quick: PREVIEW,
+        is_long: false,
+        curve: Curve::Shear,
+    },
+    Part {
+        name: "shear-other-way",
+        title: "Shear of the fabric the other way and back",
+        case: CELL,
+        changes: &[r#"steps=[{ "pretension": { "time_s": 3e-3 } },
+            { "stretch": { "warp": "corner_driven", "weft": "corner_driven", "time_s": 0.5e-3 } },
+            { "shear": { "angle_deg": -45, "time_s": 13e-3 } }, { "shear": { "angle_deg": 0, "time_s": 13e-3 } }]"#],
+        quick: PREVIEW,
+        is_long: false,
+        curve: Curve::Shear,
+    },
+    Part {
+        name: "warp-tension",
+        title: "Tension of the fabric along the warps, and back",
+        case: CELL,
+        changes: &[r#"steps=[{ "pretension": { "time_s": 3e-3 } }, { "stretch": { "warp": { "to": 1.002 },
+            "weft": { "force_n_per_mm": 0 }, "time_s": 4e-3 } }, { "stretch": { "warp": { "to": 1 },
+            "weft": { "force_n_per_mm": 0 }, "time_s": 4e-3 } }]"#],
+        quick: PREVIEW,
+        is_long: false,
+        curve: Curve::Tension { of_warp: true },
+    },
+    Part {
+        name: "weft-tension",
+        title: "Tension of the fabric along the wefts, and back",
+        case: CELL,
+        changes: &[r#"steps=[{ "pretension": { "time_s": 3e-3 } }, { "stretch": { "weft": { "to": 1.002 },
+            "warp": { "force_n_per_mm": 0 }, "time_s": 4e-3 } }, { "stretch": { "weft": { "to": 1 },
+            "warp": { "force_n_per_mm": 0 }, "time_s": 4e-3 } }]"#],
+        quick: PREVIEW,
+        is_long: false,
+        curve: Curve::Tension { of_warp: false },
+    },
+    Part {
+        name: "bias-extension",
+        title: "Bias extension of a small specimen",
+        case: SPECIMEN,
+        changes: &[],
+        quick: &[],
+        is_long: true,
+        curve: Curve::Shear,
+    },
+];
+
+impl Part {
+    /// The text of its case, and the changes to it.
+    pub fn case(&self, quick: bool) -> (&'static str, impl Iterator<Item = &'static str> + use<>) {
+        let quick = if quick { self.quick } else { &[] };
+        (self.case, self.changes.iter().chain(quick).copied())
+    }
+}
