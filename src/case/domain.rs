@@ -1,5 +1,6 @@
 //! The simulated piece of fabric and its mesh resolution.
 
+use crate::settings::friction::Friction;
 use crate::settings::material::Material;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -201,10 +202,9 @@ pub struct InlineMesh {
     /// Chains of 2-node beams.
     #[serde(default)]
     pub threads: Vec<InlineThread>,
-    /// Coulomb friction coefficient of every contact. Default 0.
+    /// Coulomb friction coefficient of every contact, or coefficients by kind of pair. Default 0.
     #[serde(default)]
-    #[schemars(range(min = 0, max = 2))]
-    pub friction: f64,
+    pub friction: Friction,
     /// Conditions on nodes.
     #[serde(default)]
     pub conditions: Vec<Condition>,

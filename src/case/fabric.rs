@@ -1,5 +1,6 @@
 //! Parameters of a fabric: yarns, stitch, materials, friction. Usually a separate file, shared between cases.
 
+use crate::settings::friction::Friction;
 use crate::settings::material::Material;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,9 +18,8 @@ pub struct Fabric {
     pub weft: Yarn,
     /// The thread that binds both plies.
     pub stitch: Stitch,
-    /// Coulomb friction coefficient of every contact, 0 to 2. Paper: 0.2.
-    #[schemars(range(min = 0, max = 2))]
-    pub friction: f64,
+    /// Coulomb friction coefficient of every contact, 0 to 2, or coefficients by kind of pair. Paper: 0.2 for all.
+    pub friction: Friction,
     /// Distance between the two plies before pre-tension, mm. Default 0.
     #[serde(default)]
     #[schemars(range(min = 0, max = 10))]

@@ -1,6 +1,7 @@
 //! Nodes, blocks of hexahedra (yarns) and threads of beams. Straight extrusions keep their structure: nodes are numbered
 //! along the fibre first, so that the corners of neighbouring hexahedra are contiguous and every fibre line is a range.
 
+use crate::settings::friction::Friction;
 use crate::settings::material::Material;
 
 pub mod centre;
@@ -39,7 +40,7 @@ pub struct Mesh {
     /// Threads.
     pub threads: Vec<Thread>,
     /// Coulomb friction coefficient of every contact.
-    pub friction: f64,
+    pub friction: Friction,
 }
 
 /// Which ply a yarn belongs to.

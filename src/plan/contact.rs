@@ -291,6 +291,9 @@ impl ContactScene<'_> {
             status,
         ];
         let kernel = flagged!(penalty::Penalty; thread, friction, periodic);
+        let coefficients = self.tables.mesh.friction.pairs();
+        let coefficient = if thread { coefficients.thread_yarn } else { coefficients.yarn_yarn };
+        let params = Params { friction: coefficient as f32, ..params };
         b.plan.step.push(Stage::new(names.step, kernel, (count, 128), &wires, params).beside());
         FaceBuffers { sums, carriers, near, gaps, keys, touches, found }
     }
@@ -314,6 +317,7 @@ impl ContactScene<'_> {
         let forces = wires![velocity, mass, sums: (sums, each), forces: force, stiffness];
         let wires = [&both[..], &forces].concat();
         let kernel = flagged!(threads::Force; friction, periodic);
+        let params = Params { friction: self.tables.mesh.friction.pairs().thread_thread as f32, ..params };
         b.plan.step.push(Stage::new("thread-thread contact", kernel, (beams, 32), &wires, params).beside());
         PairBuffers { sums, keys, state, found }
     }
@@ -369,7 +373,8 @@ impl ContactScene<'_> {
             origin: origin.map(|x| x as f32),
             cell: [0, 1].map(|k| (size[k] / f64::from(cells[k])) as f32),
             skin: self.chosen.skin_mm as f32,
-            friction: if active.friction { mesh.friction as f32 } else { 0.0 },
+            // set for the forces of each kind of pair
+            friction: 0.0,
             tangential: self.chosen.tangential_ratio as f32,
             damping: self.chosen.damping_ratio as f32,
             // a pair may reach 2²⁷ quanta, a node the sum of sixteen such pairs; line pieces push with at most 0.39 k L r

@@ -42,7 +42,7 @@ impl Active {
             thread_yarn,
             yarn_yarn,
             thread_thread,
-            friction: touches && mesh.friction > 0.0 && contact.is_some_and(|c| c.friction),
+            friction: touches && mesh.friction.largest() > 0.0 && contact.is_some_and(|c| c.friction),
             bending: effects.bending && mesh.threads.iter().any(|t| t.bending > 0.0 && t.beams() > 1),
             thermal: tightens && mesh.threads.iter().any(|t| t.thermal_strain != 0.0),
             gravity: effects.gravity_mm_s2.is_some_and(|g| g != [0.0; 3]),

@@ -2,6 +2,7 @@
 //! (serde), and ranges, units and defaults in the schema (schemars).
 
 pub mod effects;
+pub mod friction;
 pub mod integration;
 pub mod material;
 pub mod steps;

@@ -73,9 +73,7 @@ impl Simulation {
         }
         // without friction there are no buffers for it
         let mut scene = self.scene.clone();
-        if scene.mesh.friction > 0.0 {
-            scene.mesh.friction = STICK;
-        }
+        scene.mesh.friction = scene.mesh.friction.with(STICK);
         if let Some(contact_mass) = &mut scene.effects.contact_mass {
             contact_mass.memory = 1.0;
         }

@@ -13,6 +13,10 @@ const DENSITY: f64 = 1e-6;
 
 /// A block on a plane tilted about y, with the initial penetration that its weight produces.
 fn incline(degrees: f64, damping: Value, precision: Precision) -> Simulation {
+    incline_with(degrees, damping, precision, json!(FRICTION))
+}
+
+fn incline_with(degrees: f64, damping: Value, precision: Precision, friction: Value) -> Simulation {
     let (sine, cosine) = degrees.to_radians().sin_cos();
     let ground = block("ground", [15, 13, 1], [[-4.0, -4.0, -1.0], [8.0, 4.0, 0.0]], DENSITY, neo_hookean(1000.0, 0.3));
     let slider = block("slider", [6, 5, 2], [[-1.5, -1.5, 0.0], [1.5, 1.5, 1.0]], DENSITY, neo_hookean(1000.0, 0.3));
@@ -20,7 +24,7 @@ fn incline(degrees: f64, damping: Value, precision: Precision) -> Simulation {
         bare(),
         &[
             ("/domain/mesh/blocks", json!([ground, slider])),
-            ("/domain/mesh/friction", json!(FRICTION)),
+            ("/domain/mesh/friction", friction),
             ("/domain/mesh/conditions", json!([{ "within": [[-9, -9, -9], [9, 9, 9]], "body": "ground" }])),
             ("/effects/contact", json!({})),
             ("/effects/damping", damping),
@@ -111,7 +115,7 @@ fn just_above_its_limit_a_block_slides() {
 }
 
 /// Tension after over tension before a drum over which a thread is pulled.
-fn capstan(friction: f64, wrap: f64, columns: usize, beam: f64) -> f64 {
+fn capstan(friction: &Value, wrap: f64, columns: usize, beam: f64) -> f64 {
     let (drum, radius, leg) = (5.0, 0.1, 2.0);
     let half = shaped("drum", [2, columns, 1], DENSITY, neo_hookean(1000.0, 0.3), |t| {
         let (s, c) = (PI * t[1]).sin_cos();
@@ -139,7 +143,7 @@ fn capstan(friction: f64, wrap: f64, columns: usize, beam: f64) -> f64 {
         &[
             ("/domain/mesh/blocks", json!([half])),
             ("/domain/mesh/threads", json!([thread])),
-            ("/domain/mesh/friction", json!(friction)),
+            ("/domain/mesh/friction", friction.clone()),
             (
                 "/domain/mesh/conditions",
                 json!([
@@ -179,17 +183,33 @@ fn capstan(friction: f64, wrap: f64, columns: usize, beam: f64) -> f64 {
 
 #[test]
 fn a_thread_around_a_drum_follows_the_capstan_law() {
+    let of_threads_on_yarns = json!({ "thread_yarn": FRICTION, "yarn_yarn": 1, "thread_thread": 0 });
     for (wrap, name, number) in [(FRAC_PI_2, "90°", 1.36911), (PI, "180°", 1.87446)] {
         let expected = (FRICTION * wrap).exp();
         near(&format!("e^μθ over {name}"), expected, number, 1e-5);
         for (columns, beam, allowed) in [(24, 0.4, 0.03), (60, 0.2, 0.01)] {
-            let ratio = capstan(FRICTION, wrap, columns, beam);
+            let ratio = capstan(&of_threads_on_yarns, wrap, columns, beam);
             near(&format!("tension ratio over {name}, {columns} faces, beams of {beam} mm"), ratio, expected, allowed);
         }
     }
     // faces and beams that enter and leave contact are felt, less so with finer meshes
     for (wrap, columns, beam, allowed) in [(FRAC_PI_2, 60, 0.2, 2e-3), (PI, 120, 0.15, 5e-4)] {
-        let ratio = capstan(0.0, wrap, columns, beam);
+        let ratio = capstan(&json!(0), wrap, columns, beam);
         near(&format!("tension ratio without friction, {columns} faces"), ratio, 1.0, allowed);
     }
+}
+
+/// Coefficients by kind of pair act on their own kind: a block on a slope slides as with one for all, bit by bit, and
+/// without loss where only the other kinds have friction.
+#[test]
+fn each_kind_of_pair_has_its_own_coefficient() {
+    let slope = |friction: Value| {
+        let mut simulation = incline_with(12.0, json!(null), F32, friction);
+        advance(&mut simulation, 2e-3);
+        (simulation.state_hash(), simulation.energies().friction)
+    };
+    let by_pair = |thread_yarn: f64, yarn_yarn: f64| json!({ "thread_yarn": thread_yarn, "yarn_yarn": yarn_yarn, "thread_thread": 0.4 });
+    assert_eq!(slope(json!(FRICTION)), slope(by_pair(0.0, FRICTION)));
+    assert!(slope(json!(FRICTION)).1 > 0.0);
+    assert_eq!(slope(by_pair(0.3, 0.0)).1, 0.0);
 }

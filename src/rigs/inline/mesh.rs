@@ -127,12 +127,13 @@ fn finite(p: &Vector) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::friction::Friction;
 
     fn block(json: &str) -> Result<Mesh> {
         let base =
             r#""name": "b", "density_t_mm3": 1e-9, "material": { "neo_hookean": { "young_mpa": 1, "poisson": 0.3 } }"#;
         let block = serde_json::from_str(&format!("{{ {base}, {json} }}")).unwrap();
-        build(&InlineMesh { blocks: vec![block], threads: vec![], friction: 0.0, conditions: vec![] })
+        build(&InlineMesh { blocks: vec![block], threads: vec![], friction: Friction::default(), conditions: vec![] })
     }
 
     #[test]
@@ -164,7 +165,7 @@ mod tests {
         let inline = InlineMesh {
             blocks: vec![],
             threads: vec![serde_json::from_str(thread).unwrap()],
-            friction: 0.0,
+            friction: Friction::default(),
             conditions: vec![],
         };
         let message = build(&inline).unwrap_err().to_string();
