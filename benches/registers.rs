@@ -10,7 +10,6 @@ mod offline {
     use serde_json::{Value, json};
     use std::collections::BTreeMap;
     use std::error::Error;
-    use std::ffi::CStr;
     use std::path::Path;
     use tricot::kernel::dispatch::Dispatch;
     use tricot::kernel::shader::ENTRY;
@@ -119,7 +118,7 @@ mod offline {
                 layout(vk::DescriptorType::STORAGE_BUFFER, buffers)?,
                 layout(vk::DescriptorType::UNIFORM_BUFFER, 2 * dispatch.stages().len())?,
             ];
-            let entry = CStr::from_bytes_with_nul(b"main\0")?;
+            let entry = c"main";
             assert_eq!(entry.to_bytes(), ENTRY.as_bytes());
             // SAFETY: see `new`.
             unsafe {

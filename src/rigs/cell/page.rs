@@ -1,8 +1,26 @@
 //! The curves of a cell in a report.
 
 use crate::error::Result;
+use crate::output::chart::{self, Curve};
+use crate::output::columns::Columns;
 use crate::output::page::Page;
 use crate::output::results::Results;
+
+/// Membrane force along the fibres of each ply over their strain, while the cell is stretched.
+fn tension(results: &Results, stress: &Columns, page: &mut Page) {
+    let phases = results.history.texts("phase");
+    let curve = |ply: &'static str| {
+        let [stretches, forces] =
+            ["stretch", "membrane_n_per_mm"].map(|column| stress.numbers(&format!("{ply}_{column}")));
+        let rows = stretches.iter().zip(forces).zip(&phases).filter(|(_, phase)| **phase == "stretch");
+        let points = rows.map(|((stretch, force), _)| [100.0 * (stretch - 1.0), force]).collect();
+        Curve { name: ply, points, spread: Vec::new() }
+    };
+    if let Some(svg) = chart::curves(["strain, %", "N/mm"], &["warp", "weft"].map(curve)) {
+        let caption = "Along the fibres of each ply, per width of the fabric across them, while it is stretched.";
+        page.figure("Tension of the fabric, N/mm", &svg, caption);
+    }
+}
 
 pub(super) fn curves(results: &Results, page: &mut Page) -> Result<()> {
     let (axis, history) = (results.axis(), &results.history);
@@ -15,9 +33,8 @@ pub(super) fn curves(results: &Results, page: &mut Page) -> Result<()> {
             let caption = "Along the fibres, per width of the fabric across them.";
             results.chart(page, &stress, &axis, ["Membrane force", "N/mm"], &fibres, caption);
         }
-    } else {
-        let caption = "Of the grips on their largest displacement; each of them is in reactions.csv.";
-        results.chart(page, history, &axis, ["Force", "N"], &[("force_n", "force")], caption);
+    } else if let Some(stress) = results.other("stress.csv")? {
+        tension(results, &stress, page);
     }
     if let Some(shear) = results.other("shear.csv")? {
         let angles = [
