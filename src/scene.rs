@@ -25,7 +25,7 @@ pub struct Scene {
 }
 
 /// Nodes that move together along a line: a clamp, or a condition of a case.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Motion {
     /// Name in the table of reactions.
     pub name: String,

@@ -19,6 +19,8 @@ pub enum Domain {
     Cantilever(Cantilever),
     /// A single yarn, sheared along its fibres by the outermost ones (Fig. 8).
     YarnShear(YarnShear),
+    /// A single yarn, compacted between plates.
+    YarnCompaction(YarnCompaction),
     /// A mesh written out in the case, for verification scenes.
     Mesh(InlineMesh),
 }
@@ -180,6 +182,39 @@ impl Default for YarnShear {
     fn default() -> Self {
         Self { ply: OnePly::Warp, length_mm: 100.0, displacement_mm: 0.2 }
     }
+}
+
+/// A short piece of one yarn between smooth plates. Its section is a rectangle of the width and the area of the yarn's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct YarnCompaction {
+    /// The ply that the yarn is taken from. Default `warp`.
+    pub ply: OnePly,
+    /// Distance of the plates at the end of the `move` step, mm. Default 0.23.
+    #[schemars(range(min = 0.001, max = 20))]
+    pub thickness_mm: f64,
+    /// Whether the sides of the yarn are free. Default `held`.
+    pub sides: Sides,
+    /// Density of the fibres, g/cm³, for the fibre volume fraction. Default 1.8 (carbon).
+    #[schemars(range(min = 0.1, max = 20))]
+    pub fibre_density_g_cm3: f64,
+}
+
+impl Default for YarnCompaction {
+    fn default() -> Self {
+        Self { ply: OnePly::Warp, thickness_mm: 0.23, sides: Sides::Held, fibre_density_g_cm3: 1.8 }
+    }
+}
+
+/// Sides of a compacted yarn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Sides {
+    /// A die keeps the width.
+    #[default]
+    Held,
+    /// The yarn widens.
+    Free,
 }
 
 /// One of the two plies.

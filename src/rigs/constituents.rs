@@ -3,13 +3,14 @@
 
 use super::observer::{Loading, Observer, Seen};
 use crate::case::Case;
-use crate::case::domain::Resolution;
-use crate::case::fabric::Stitch;
+use crate::case::domain::{OnePly, Resolution};
+use crate::case::fabric::{Stitch, Yarn};
 use crate::case::provenance::Provenance;
 use crate::error::Result;
+use crate::fabric::section::Section;
 use crate::fabric::{quantised, stitch};
 use crate::kernel::record::{Record, Recorded};
-use crate::mesh::{Mesh, Part};
+use crate::mesh::{Block, Mesh, Part, Ply, quality};
 use crate::output::page::Page;
 use crate::output::results::Results;
 use crate::scene::Motion;
@@ -26,6 +27,62 @@ pub(super) fn thread(stitch: &Stitch, from: f64, length: f64, elements: usize) -
     let nodes = (0..=elements).map(at).collect();
     let piece = stitch::thread(stitch, "thread".into(), 0, None, vec![(Part::Free, 0.0); elements]);
     Mesh { nodes, threads: vec![piece], ..Mesh::default() }
+}
+
+/// The yarn of a ply, and hexahedra across it.
+pub(super) fn yarn_of(case: &Case, ply: OnePly) -> Result<(&Yarn, usize)> {
+    let (fabric, resolution) = (case.fabric()?, case.resolution.refined());
+    Ok(match ply {
+        OnePly::Warp => (&fabric.warp, resolution.warp_columns),
+        OnePly::Weft => (&fabric.weft, resolution.weft_columns),
+    })
+}
+
+/// The mesh resolution of a case with the fields that a yarn of a ply uses at their defaults; also its slices unless their number is
+/// `fixed`.
+pub(super) fn resolution_of(case: &Case, ply: OnePly, fixed: bool) -> Resolution {
+    let Resolution { warp_columns, weft_columns, layers, slice_mm, finer, .. } = Resolution::default();
+    let own = case.resolution.clone();
+    let own = match ply {
+        OnePly::Warp => Resolution { warp_columns, ..own },
+        OnePly::Weft => Resolution { weft_columns, ..own },
+    };
+    let slice_mm = if fixed { own.slice_mm } else { slice_mm };
+    Resolution { layers, slice_mm, finer, ..own }
+}
+
+/// Area of the section of a yarn, mm², and the thickness of a rectangle of the same width and area, mm.
+pub(super) fn rectangle(yarn: &Yarn) -> [f64; 2] {
+    let section = Section { width: yarn.width_mm, thickness: yarn.thickness_mm, truncation: yarn.truncation };
+    [section.area(), section.area() / yarn.width_mm]
+}
+
+/// A straight piece of a yarn with a rectangular section about the origin: length along x, width along y, thickness along z, mm, and
+/// the hexahedra along each. Its fibres run along x.
+pub(super) fn yarn(yarn: &Yarn, size: [f64; 3], [slices, columns, layers]: [usize; 3]) -> Mesh {
+    let place = |i: usize, count: usize, size: f64| quantised((i as f64 / count as f64 - 0.5) * size);
+    let mut mesh = Mesh::default();
+    for layer in 0..=layers {
+        for column in 0..=columns {
+            let [y, z] = [place(column, columns, size[1]), place(layer, layers, size[2])];
+            mesh.nodes.extend((0..=slices).map(|slice| [place(slice, slices, size[0]), y, z]));
+        }
+    }
+    let [area, _] = rectangle(yarn);
+    mesh.blocks.push(Block {
+        name: "yarn".into(),
+        ply: Ply::Free,
+        first: 0,
+        slices,
+        columns,
+        layers,
+        wrap: None,
+        fibre: [1.0, 0.0, 0.0],
+        density: yarn.areal_mass_g_m2 * quality::TONNES_PER_MM2 * yarn.pitch_mm / area,
+        material: yarn.material.clone(),
+        velocity: [0.0; 3],
+    });
+    mesh
 }
 
 /// A grip on all components of some nodes, which moves by a distance along x.

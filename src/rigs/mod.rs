@@ -13,6 +13,7 @@ pub mod inline;
 pub mod observer;
 pub mod read;
 mod thread_tension;
+mod yarn_compaction;
 mod yarn_shear;
 
 use crate::case::Case;
@@ -86,6 +87,7 @@ pub fn of(domain: &Domain) -> &dyn Rig {
         Domain::ThreadTension(tension) => tension,
         Domain::Cantilever(cantilever) => cantilever,
         Domain::YarnShear(shear) => shear,
+        Domain::YarnCompaction(compaction) => compaction,
         Domain::Mesh(inline) => inline,
     }
 }
@@ -98,6 +100,7 @@ pub fn of_mut(domain: &mut Domain) -> &mut dyn Rig {
         Domain::ThreadTension(tension) => tension,
         Domain::Cantilever(cantilever) => cantilever,
         Domain::YarnShear(shear) => shear,
+        Domain::YarnCompaction(compaction) => compaction,
         Domain::Mesh(inline) => inline,
     }
 }

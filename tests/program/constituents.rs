@@ -73,3 +73,19 @@ fn a_sheared_yarn_gives_its_shear_stiffness() {
         assert!(long < 120.0 && short < 60.0, "free ends do not stiffen");
     }
 }
+
+/// The law gives the pressure of a homogeneous state in closed form: a yarn in a die, and one whose sides are free, return K_comp.
+#[test]
+fn a_compacted_yarn_gives_its_compaction_stiffness() {
+    for (sides, precision) in [("held", Precision::F32), ("held", Precision::F64), ("free", Precision::F32)] {
+        for thickness in [0.26, 0.2] {
+            let sets = [
+                format!("domain.yarn_compaction.sides={sides}"),
+                format!("domain.yarn_compaction.thickness_mm={thickness}"),
+            ];
+            let summary = summary("yarn_compaction", &[&sets[0], &sets[1], "output.rows_per_step=10"], precision);
+            assert_eq!(summary["property"]["given"], json!(1.25));
+            assert!(error(&summary).abs() < 5e-3, "{sides} {thickness}: {}", error(&summary));
+        }
+    }
+}

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use tricot::rigs::read::read;
+use tricot::rigs::read::{of_fabric, read};
 
 const LONGEST_FILE: usize = 500;
 
@@ -148,7 +148,10 @@ fn the_readme_speaks_of_what_is_there() {
         let sets: Vec<String> =
             command.windows(2).filter(|w| w[0] == "--set").map(|w| w[1].trim_matches('\'').to_string()).collect();
         if let Some(case) = command.iter().find(|w| w.starts_with("cases/")) {
-            read(Path::new(case), &sets).unwrap();
+            let path = Path::new(case);
+            let is_fabric = path.starts_with("cases/fabrics");
+            let cell = || text(Path::new("cases/unit_cell_shear.json"));
+            if is_fabric { of_fabric("cell", &cell(), path, &sets) } else { read(path, &sets) }.unwrap();
         }
     }
     let example = text(Path::new("examples/cell.rs"));

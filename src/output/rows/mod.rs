@@ -4,6 +4,7 @@
 //! (`energies.csv`, `probes.csv`) have no row type; they are [`Named`](super::table::Named).
 
 mod cantilever;
+mod compaction;
 mod contacts;
 mod crossings;
 mod history;
@@ -16,6 +17,7 @@ mod yarns_each;
 mod zones;
 
 pub use cantilever::Cantilever;
+pub use compaction::Compaction;
 pub use contacts::Contacts;
 pub use crossings::Crossing;
 pub use history::History;

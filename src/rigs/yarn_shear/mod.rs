@@ -6,32 +6,21 @@
 //! fibres. There the yarn carries less: about one and a half widths of it are missing in F, so that a long yarn, or the difference
 //! of two lengths, gives K_sh.
 
-use super::constituents::{Property, Pull, grip, section, steps, unused};
+use super::constituents::{
+    Property, Pull, grip, rectangle, resolution_of, section, steps, unused, yarn as yarn_piece, yarn_of,
+};
 use super::observer::{Observer, Tables};
 use super::{Piece, Rig, check};
 use crate::case::Case;
-use crate::case::domain::{OnePly, Resolution, YarnShear};
+use crate::case::domain::YarnShear;
 use crate::case::fabric::Yarn;
 use crate::case::provenance::Provenance;
 use crate::error::Result;
 use crate::fabric::quantised;
-use crate::fabric::section::Section;
-use crate::mesh::{Block, Mesh, Ply, quality};
 use crate::output::page::Page;
 use crate::output::results::Results;
 use crate::settings::material::Material;
 use crate::simulate::Simulation;
-
-impl YarnShear {
-    /// The yarn, and hexahedra across it.
-    fn yarn<'a>(&self, case: &'a Case) -> Result<(&'a Yarn, usize)> {
-        let (fabric, resolution) = (case.fabric()?, case.resolution.refined());
-        Ok(match self.ply {
-            OnePly::Warp => (&fabric.warp, resolution.warp_columns),
-            OnePly::Weft => (&fabric.weft, resolution.weft_columns),
-        })
-    }
-}
 
 /// The longitudinal shear stiffness of a yarn, if its law has one, MPa.
 fn stiffness(yarn: &Yarn) -> Option<f64> {
@@ -41,23 +30,12 @@ fn stiffness(yarn: &Yarn) -> Option<f64> {
     }
 }
 
-/// Area of the section of a yarn, mm², and the thickness of a rectangle of the same width and area, mm.
-fn section_of(yarn: &Yarn) -> [f64; 2] {
-    let section = Section { width: yarn.width_mm, thickness: yarn.thickness_mm, truncation: yarn.truncation };
-    [section.area(), section.area() / yarn.width_mm]
-}
-
 impl Rig for YarnShear {
     fn check(&self, case: &Case, provenance: &Provenance) -> Result<()> {
         check::fabric(case, "yarn", provenance)?;
         steps(case, "yarn_shear", self.displacement_mm, provenance)?;
-        let Resolution { layers, slice_mm, finer, .. } = Resolution::default();
-        let used = match self.ply {
-            OnePly::Warp => Resolution { warp_columns: Resolution::default().warp_columns, ..case.resolution.clone() },
-            OnePly::Weft => Resolution { weft_columns: Resolution::default().weft_columns, ..case.resolution.clone() },
-        };
-        unused(case, &Resolution { layers, slice_mm, finer, ..used }, "this yarn", provenance)?;
-        let (yarn, _) = self.yarn(case)?;
+        unused(case, &resolution_of(case, self.ply, false), "this yarn", provenance)?;
+        let (yarn, _) = yarn_of(case, self.ply)?;
         if stiffness(yarn).is_none_or(|stiffness| stiffness == 0.0) {
             let message = "needs a yarn of the charmetant law with a k_sh_mpa above 0, which the test evaluates";
             return Err(provenance.error("domain.yarn_shear", message));
@@ -74,44 +52,20 @@ impl Rig for YarnShear {
     }
 
     fn piece(&self, case: &Case) -> Result<Piece> {
-        let ((yarn, columns), resolution) = (self.yarn(case)?, case.resolution.refined());
-        let [area, thickness] = section_of(yarn);
-        let (slices, layers) = ((self.length_mm / resolution.slice_mm).round() as usize, resolution.layers);
-        let place = |share: f64, size: f64| quantised((share - 0.5) * size);
-        let mut mesh = Mesh::default();
-        for layer in 0..=layers {
-            for column in 0..=columns {
-                let y = place(column as f64 / columns as f64, yarn.width_mm);
-                let z = place(layer as f64 / layers as f64, thickness);
-                let along = (0..=slices).map(|slice| place(slice as f64 / slices as f64, self.length_mm));
-                mesh.nodes.extend(along.map(|x| [x, y, z]));
-            }
-        }
-        mesh.blocks.push(Block {
-            name: "yarn".into(),
-            ply: Ply::Free,
-            first: 0,
-            slices,
-            columns,
-            layers,
-            wrap: None,
-            fibre: [1.0, 0.0, 0.0],
-            density: yarn.areal_mass_g_m2 * quality::TONNES_PER_MM2 * yarn.pitch_mm / area,
-            material: yarn.material.clone(),
-            velocity: [0.0; 3],
-        });
-        let side = |side: f64| {
-            let y = place(side, yarn.width_mm);
-            (0..mesh.nodes.len()).filter(|node| mesh.nodes[*node][1] == y).collect()
-        };
-        let motions = vec![grip("held fibres", side(0.0), 0.0), grip("moved fibres", side(1.0), self.displacement_mm)];
+        let ((yarn, columns), resolution) = (yarn_of(case, self.ply)?, case.resolution.refined());
+        let [_, thickness] = rectangle(yarn);
+        let slices = (self.length_mm / resolution.slice_mm).round() as usize;
+        let mesh = yarn_piece(yarn, [self.length_mm, yarn.width_mm, thickness], [slices, columns, resolution.layers]);
+        let end = quantised(0.5 * yarn.width_mm);
+        let side = |y: f64| (0..mesh.nodes.len()).filter(|node| mesh.nodes[*node][1] == y).collect();
+        let motions = vec![grip("held fibres", side(-end), 0.0), grip("moved fibres", side(end), self.displacement_mm)];
         Ok(Piece { mesh, motions, ..Piece::default() })
     }
 
     fn observer(&self, case: &Case, _: &Simulation, _: &Tables) -> Result<Box<dyn Observer>> {
-        let (yarn, _) = self.yarn(case)?;
+        let (yarn, _) = yarn_of(case, self.ply)?;
         let given = stiffness(yarn).unwrap_or_default();
-        let [_, thickness] = section_of(yarn);
+        let [_, thickness] = rectangle(yarn);
         let property = Property { symbol: "K_sh", unit: "MPa", by: "F/(γ L h)", evaluated: f64::NAN, given };
         Ok(Box::new(Pull::new(property, self.length_mm * thickness / yarn.width_mm)))
     }

@@ -32,6 +32,7 @@ const CELL: &str = include_str!("../../../cases/unit_cell_shear.json");
 const SPECIMEN: &str = include_str!("../../../cases/bias_extension_small.json");
 const THREAD: &str = include_str!("../../../cases/thread_tension.json");
 const CANTILEVER: &str = include_str!("../../../cases/cantilever.json");
+const COMPACTION: &str = include_str!("../../../cases/yarn_compaction.json");
 const YARN: &str = include_str!("../../../cases/yarn_shear.json");
 
 const PREVIEW: &[&str] = &["accuracy=preview"];
@@ -57,6 +58,7 @@ pub(super) const PARTS: &[Part] = &[
         YARN,
         &["domain.yarn_shear.ply=weft", r#"resolution={ "weft_columns": 6, "slice_mm": 1 }"#],
     ),
+    of_constituent("warp-compaction", "Compaction of a warp in a die", COMPACTION, &[]),
     Part {
         name: "shear",
         title: "Shear of the fabric and back",
