@@ -4,7 +4,6 @@
 #include "dynamics/integrate"
 
 #if ROOT
-#if prescribed
 struct Params {
     first_thread: u32,
 }
@@ -46,17 +45,4 @@ fn prescribed(item: u32) {
         inverse_mass[node] = 0.0;
     }
 }
-#endif
-
-#if hold
-// Undoes the change of prescribed components by the fibre lines.
-fn hold(item: u32) {
-    let plane = arrayLength(&correction) / 3u;
-    for (var k = 0u; k < 3u; k++) {
-        if ((nodes[2u * item + 1u] >> k) & 1u) == 1u {
-            correction[nodes[2u * item] + k * plane] = 0.0;
-        }
-    }
-}
-#endif
 #endif

@@ -38,9 +38,19 @@ fn acceleration_at(node: u32) -> vec3<f32> {
     return vec3<f32>(acceleration[node], acceleration[node + plane], acceleration[node + 2u * plane]);
 }
 
-// Off-diagonal between a segment and the next.
-fn coupling(i: u32, next: u32) -> f32 {
-    return -(dot(stations[i].xyz, stations[next].xyz) * stations[next].w);
+// A direction in the components of a node that are not prescribed.
+fn free(direction: vec3<f32>, node: u32) -> vec3<f32> {
+#if HELD
+    let mask = vec3<u32>(held[node]) >> vec3<u32>(0u, 1u, 2u);
+    return select(direction, vec3<f32>(), (mask & vec3<u32>(1u)) == vec3<u32>(1u));
+#else
+    return direction;
+#endif
+}
+
+// Off-diagonal between a segment and the next, of a line that begins at node `first`.
+fn coupling(first: u32, i: u32, next: u32) -> f32 {
+    return -(dot(stations[i].xyz, free(stations[next].xyz, first + next)) * stations[next].w);
 }
 
 // Unknown of a row after the reduction to diagonals; `end` is the unknown of the last row.
@@ -81,13 +91,18 @@ fn fibre_lines(number: u32, local: u32) {
         let d = stations[i].xyz;
         var diagonal = 1.0;
         if any(d != vec3<f32>()) {
-            diagonal = compliance / rows[i].x + stations[i].w + stations[next].w;
+#if HELD
+            let both = dot(d, free(d, first + i)) * stations[i].w + dot(d, free(d, first + next)) * stations[next].w;
+#else
+            let both = stations[i].w + stations[next].w;
+#endif
+            diagonal = compliance / rows[i].x + both;
         }
         let right = -dot(d, acceleration_at(first + next) - acceleration_at(first + i));
-        var along = coupling(i, next);
+        var along = coupling(first, i, next);
         var border = 0.0;
         if i == 0u {
-            border = coupling(last, 0u);
+            border = coupling(first, last, 0u);
         }
         if i + 1u == last {
             border = border + along;
@@ -129,8 +144,8 @@ fn fibre_lines(number: u32, local: u32) {
     }
 
     // coupling of the first row and of the last but one to the last row
-    let back = coupling(last, 0u);
-    let ahead = coupling(last - 1u, last);
+    let back = coupling(first, last, 0u);
+    let ahead = coupling(first, last - 1u, last);
     let low = rows[0];
     let high = rows[last - 1u];
     let bottom = rows[last];
@@ -141,7 +156,7 @@ fn fibre_lines(number: u32, local: u32) {
         let previous = select(i - 1u, last, i == 0u);
         let p = select(solution(previous, end), end, previous == last);
         let q = select(solution(i, end), end, i == last);
-        let a = (p * stations[previous].xyz - q * stations[i].xyz) * stations[i].w;
+        let a = free((p * stations[previous].xyz - q * stations[i].xyz) * stations[i].w, first + i);
         correction[first + i] = a.x;
         correction[first + i + plane] = a.y;
         correction[first + i + 2u * plane] = a.z;

@@ -20,13 +20,8 @@ pub struct Params {
     pub first_thread: u32,
 }
 
-/// Node and mask of components (bit k for component k), 2 numbers per condition.
-const NODES: Slot = Slot::read("nodes", Uint);
-
 /// Replaces the accelerations of prescribed components before the fibre lines use them; `DAMPING` as for the integration.
 pub struct Prescribed<const DAMPING: bool>;
-/// Undoes the change of prescribed components by the fibre lines.
-pub struct Hold;
 
 impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
     const SHADER: Shader = Shader {
@@ -35,7 +30,8 @@ impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
         ..Shader::new("conditions/prescribed", "prescribed")
     };
     const SLOTS: &'static [Slot] = &[
-        NODES,
+        // node and mask of components (bit k for component k), 2 numbers per condition
+        Slot::read("nodes", Uint),
         // displacement at full amplitude, mm (3)
         Slot::read("targets", Scalar),
         Slot::read("velocity", Scalar),
@@ -86,28 +82,6 @@ impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
             }
             if mask == 7 {
                 inverse.set(node, zero);
-            }
-        }
-    }
-}
-
-impl Kernel for Hold {
-    const SHADER: Shader =
-        Shader { constants: &[&position::CONSTANTS], ..Shader::new("conditions/prescribed", "hold") };
-    const SLOTS: &'static [Slot] = &[NODES, Slot::scatter("correction", Scalar)];
-    const WIDE: bool = false;
-
-    #[inline(always)]
-    fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let nodes = io.uints(slot!(Self::SLOTS, "nodes"));
-        let mut correction = io.scatter::<L::Scalar>(slot!(Self::SLOTS, "correction"));
-        let plane = correction.len() / 3;
-        for item in items {
-            let (node, mask) = (nodes[2 * item] as usize, nodes[2 * item + 1]);
-            for k in 0..3 {
-                if mask >> k & 1 == 1 {
-                    correction.set(node + k * plane, L::Scalar::from_f64(0.0));
-                }
             }
         }
     }

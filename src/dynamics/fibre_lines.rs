@@ -8,6 +8,9 @@
 //!
 //! diagonal 1/(β dt² k_s) + 1/m_s + 1/m_{s+1}, off-diagonal −d_s·d_{s+1}/m_{s+1}, right side −d_s·(a_{s+1} − a_s).
 //!
+//! A node that is prescribed along some axes takes part with its free components only: 1/m is then a diagonal matrix with zeros for
+//! the others, between the directions of the segments that it joins.
+//!
 //! A mass μ = β dt² k that only resisted the stretching of a segment would have the force −μ (d·(a_{s+1} − a_s) + u²/l) d, with u
 //! the relative velocity of its nodes across it. The second term is left out: with u from half a step before, it feeds energy
 //! into whipping threads. Without it, the added mass does work on fast zigzags of light nodes, and fine meshes need a margin
@@ -80,37 +83,42 @@ pub struct Params {
     pub beta: f32,
 }
 
-const SLOTS: [Slot; 8] = [
-    Slot::read("lines", Uint),
-    // axial stiffness at rest of the segment that starts at a node, N/mm; 0 for none
-    Slot::read("stiffness", Scalar),
-    Slot::read("reference", Int),
-    Slot::read("quanta", Int),
-    Slot::read("remainder", Scalar),
-    Slot::read("acceleration", Scalar),
-    Slot::read("inverse_mass", Scalar),
-    // change of acceleration, mm/s² (3 planes)
-    Slot::scatter("correction", Scalar),
-];
+const fn slots(held: bool) -> [Slot; 9] {
+    [
+        Slot::read("lines", Uint),
+        // axial stiffness at rest of the segment that starts at a node, N/mm; 0 for none
+        Slot::read("stiffness", Scalar),
+        Slot::read("reference", Int),
+        Slot::read("quanta", Int),
+        Slot::read("remainder", Scalar),
+        Slot::read("acceleration", Scalar),
+        Slot::read("inverse_mass", Scalar),
+        // bit k: component k of the node is prescribed
+        Slot::read("held", Uint).when(held),
+        // change of acceleration, mm/s² (3 planes)
+        Slot::scatter("correction", Scalar),
+    ]
+}
 
-/// The correction of accelerations; with `PERIODIC`, lines deform with F̄ and may close through the cell.
-pub struct FibreLines<const PERIODIC: bool>;
+/// The correction of accelerations; with `PERIODIC`, lines deform with F̄ and may close through the cell; with `HELD`, some nodes are
+/// prescribed along some axes only.
+pub struct FibreLines<const PERIODIC: bool, const HELD: bool>;
 
-impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
+impl<const PERIODIC: bool, const HELD: bool> Kernel for FibreLines<PERIODIC, HELD> {
     const SHADER: Shader = Shader {
-        defines: &[when(PERIODIC, "PERIODIC")],
+        defines: &[when(PERIODIC, "PERIODIC"), when(HELD, "HELD")],
         // one workgroup per line
         share: Share::Workgroups(1),
         constants: &[&position::CONSTANTS, &constants![uint: LINE, CLOSED, FREE]],
         ..Shader::new("dynamics/fibre_lines", "fibre_lines")
     };
-    const SLOTS: &'static [Slot] = &SLOTS;
+    const SLOTS: &'static [Slot] = &slots(HELD);
 
     #[inline(always)]
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
-        let table: &[Line] = bytemuck::cast_slice(io.uints(slot!(&SLOTS, "lines")));
-        let nodes = Nodes::new(io);
-        let mut correction = io.scatter(slot!(&SLOTS, "correction"));
+        let table: &[Line] = bytemuck::cast_slice(io.uints(slot!(Self::SLOTS, "lines")));
+        let nodes = Nodes::new::<HELD>(io);
+        let mut correction = io.scatter(slot!(Self::SLOTS, "correction"));
         let mut block = Block::new();
         // of the systems and the directions of lines
         let mut memory = scratch::take::<Vec<CacheLine>>();
@@ -123,7 +131,7 @@ impl<const PERIODIC: bool> Kernel for FibreLines<PERIODIC> {
                 }
             }
             if count > 0 {
-                solve::<L, PERIODIC>(&nodes, &lines[..count], &mut memory, &mut block, &mut correction);
+                solve::<L, PERIODIC, HELD>(&nodes, &lines[..count], &mut memory, &mut block, &mut correction);
             }
         }
         scratch::put_back(memory);
@@ -138,6 +146,8 @@ struct Nodes<'a, R> {
     acceleration: View<'a, R>,
     inverse_mass: View<'a, R>,
     stiffness: &'a [R],
+    /// Bit k of a node: its component k is prescribed.
+    held: &'a [u32],
     /// F̄ − I.
     gradient: &'a [[R; 3]; 3],
     /// 1/(β dt²).
@@ -146,19 +156,28 @@ struct Nodes<'a, R> {
 
 impl<'a, R: Real> Nodes<'a, R> {
     #[inline(always)]
-    fn new(io: &'a Io<R>) -> Self {
+    fn new<const HELD: bool>(io: &'a Io<R>) -> Self {
         let Params { beta } = io.params();
         let beta = R::from_f64(f64::from(beta));
         Self {
-            reference: io.ints(slot!(&SLOTS, "reference")),
-            quanta: io.view(slot!(&SLOTS, "quanta")),
-            remainder: io.view(slot!(&SLOTS, "remainder")),
-            acceleration: io.view(slot!(&SLOTS, "acceleration")),
-            inverse_mass: io.view(slot!(&SLOTS, "inverse_mass")),
-            stiffness: io.scalars(slot!(&SLOTS, "stiffness")),
+            reference: io.ints(slot!(&slots(HELD), "reference")),
+            quanta: io.view(slot!(&slots(HELD), "quanta")),
+            remainder: io.view(slot!(&slots(HELD), "remainder")),
+            acceleration: io.view(slot!(&slots(HELD), "acceleration")),
+            inverse_mass: io.view(slot!(&slots(HELD), "inverse_mass")),
+            stiffness: io.scalars(slot!(&slots(HELD), "stiffness")),
+            held: if HELD { io.uints(slot!(&slots(HELD), "held", HELD)) } else { &[] },
             gradient: &io.row.gradient,
             compliance: R::from_f64(1.0) / (beta * io.row.dt * io.row.dt),
         }
+    }
+}
+
+impl<R: Real> Nodes<'_, R> {
+    /// One if a component of a node is free, zero if it is prescribed.
+    #[inline(always)]
+    fn free<const HELD: bool>(&self, node: usize, k: usize) -> R {
+        R::from_f64(if HELD && self.held[node] >> k & 1 == 1 { 0.0 } else { 1.0 })
     }
 }
 
@@ -170,8 +189,9 @@ struct Block<R> {
     moved: [[R; BLOCK]; 3],
     /// Differences of accelerations.
     jump: [[R; BLOCK]; 3],
-    /// Inverse masses of both nodes.
+    /// Inverse masses of both nodes, and which of their components are free.
     inverse_mass: [[R; BLOCK]; 2],
+    free: [[[R; BLOCK]; 3]; 2],
     /// Stiffness at rest.
     stiffness: [R; BLOCK],
     /// Current directions, after that of the segment before.
@@ -191,6 +211,7 @@ impl<R: Real> Block<R> {
             moved: [row; 3],
             jump: [row; 3],
             inverse_mass: [row; 2],
+            free: [[row; 3]; 2],
             stiffness: row,
             direction: [[R::from_f64(0.0); BLOCK + 1]; 3],
             diagonal: row,
@@ -201,7 +222,14 @@ impl<R: Real> Block<R> {
 
     /// Loads segments from nodes `start ..` to nodes `end ..` whose image is shifted, into places `at ..`.
     #[inline(always)]
-    fn load(&mut self, nodes: &Nodes<R>, [start, end]: [usize; 2], shift: [i32; 3], at: usize, count: usize) {
+    fn load<const HELD: bool>(
+        &mut self,
+        nodes: &Nodes<R>,
+        [start, end]: [usize; 2],
+        shift: [i32; 3],
+        at: usize,
+        count: usize,
+    ) {
         let plane = nodes.inverse_mass.len();
         let quantum = R::from_f64(QUANTUM);
         for k in 0..3 {
@@ -225,12 +253,18 @@ impl<R: Real> Block<R> {
         }
         self.inverse_mass[0][at..][..count].copy_from_slice(nodes.inverse_mass.slice(start, count));
         self.inverse_mass[1][at..][..count].copy_from_slice(nodes.inverse_mass.slice(end, count));
+        if HELD {
+            for (k, i) in (0..3).flat_map(|k| (0..count).map(move |i| (k, i))) {
+                self.free[0][k][at + i] = nodes.free::<HELD>(start + i, k);
+                self.free[1][k][at + i] = nodes.free::<HELD>(end + i, k);
+            }
+        }
         self.stiffness[at..][..count].copy_from_slice(&nodes.stiffness[start..][..count]);
     }
 
     /// Computes the directions and the columns of the first `count` segments.
     #[inline(always)]
-    fn compute<L: Lane<Scalar = R>, const PERIODIC: bool>(&mut self, nodes: &Nodes<R>, count: usize) {
+    fn compute<L: Lane<Scalar = R>, const PERIODIC: bool, const HELD: bool>(&mut self, nodes: &Nodes<R>, count: usize) {
         let one = L::new(1.0);
         let compliance = L::splat(nodes.compliance);
         for i in (0..count).step_by(L::WIDTH) {
@@ -250,7 +284,12 @@ impl<R: Real> Block<R> {
             let direction = [now[0] * inverse_length, now[1] * inverse_length, now[2] * inverse_length];
             let right = -dot(direction, vector(&self.jump, i));
             let [a, b] = &self.inverse_mass;
-            let diagonal = compliance / stiffness + L::load(&a[i..]) + L::load(&b[i..]);
+            let (mut a, mut b): (L, L) = (L::load(&a[i..]), L::load(&b[i..]));
+            if HELD {
+                a = a * free_part(direction, &self.free[0], i);
+                b = b * free_part(direction, &self.free[1], i);
+            }
+            let diagonal = compliance / stiffness + a + b;
             for k in 0..3 {
                 direction[k].store(&mut self.direction[k][i + 1..]);
             }
@@ -258,7 +297,12 @@ impl<R: Real> Block<R> {
             right.store(&mut self.right[i..]);
         }
         for i in (0..count).step_by(L::WIDTH) {
-            let cosine: L = dot(vector(&self.direction, i), vector(&self.direction, i + 1));
+            let (before, mut after): ([L; 3], [L; 3]) = (vector(&self.direction, i), vector(&self.direction, i + 1));
+            if HELD {
+                let free: [L; 3] = vector(&self.free[0], i);
+                after = [after[0] * free[0], after[1] * free[1], after[2] * free[2]];
+            }
+            let cosine = dot(before, after);
             let coupling = -(cosine * L::load(&self.inverse_mass[0][i..]));
             coupling.store(&mut self.coupling[i..]);
         }
@@ -268,6 +312,13 @@ impl<R: Real> Block<R> {
 #[inline(always)]
 fn vector<L: Lane, const N: usize>(rows: &[[L::Scalar; N]; 3], at: usize) -> [L; 3] {
     [L::load(&rows[0][at..]), L::load(&rows[1][at..]), L::load(&rows[2][at..])]
+}
+
+/// Share of the square of a direction in the free components of nodes.
+#[inline(always)]
+fn free_part<L: Lane>(direction: [L; 3], free: &[[L::Scalar; BLOCK]; 3], at: usize) -> L {
+    let free: [L; 3] = vector(free, at);
+    dot(direction, [direction[0] * free[0], direction[1] * free[1], direction[2] * free[2]])
 }
 
 #[inline(always)]
@@ -282,7 +333,7 @@ fn dot<L: Lane>(a: [L; 3], b: [L; 3]) -> L {
 
 /// Solves the systems of up to sixteen lines and writes the corrections of their nodes.
 #[inline(always)]
-fn solve<L: Lane, const PERIODIC: bool>(
+fn solve<L: Lane, const PERIODIC: bool, const HELD: bool>(
     nodes: &Nodes<L::Scalar>,
     lines: &[Line],
     memory: &mut Vec<CacheLine>,
@@ -303,19 +354,19 @@ fn solve<L: Lane, const PERIODIC: bool>(
     let mut systems = Systems::new::<L>(systems, longest, &counts[..lines.len()]);
     for (lane, line) in lines.iter().enumerate() {
         let directions = &mut directions[3 * longest * lane..][..3 * longest];
-        set_up::<L, PERIODIC>(nodes, line, block, directions, &mut systems, lane);
+        set_up::<L, PERIODIC, HELD>(nodes, line, block, directions, &mut systems, lane);
     }
     systems.solve::<L>();
     for (lane, line) in lines.iter().enumerate() {
         let unknowns = &mut unknowns[..line.nodes().len()];
         systems.solution(lane, unknowns);
-        correct(nodes, line, &directions[3 * longest * lane..][..3 * longest], unknowns, correction);
+        correct::<_, HELD>(nodes, line, &directions[3 * longest * lane..][..3 * longest], unknowns, correction);
     }
 }
 
 /// Computes the directions of a line's segments, in three planes, and its system.
 #[inline(always)]
-fn set_up<L: Lane, const PERIODIC: bool>(
+fn set_up<L: Lane, const PERIODIC: bool, const HELD: bool>(
     nodes: &Nodes<L::Scalar>,
     line: &Line,
     block: &mut Block<L::Scalar>,
@@ -331,11 +382,11 @@ fn set_up<L: Lane, const PERIODIC: bool>(
     for at in (0..stations).step_by(BLOCK) {
         let count = BLOCK.min(stations - at);
         let inner = count.min(last - at);
-        block.load(nodes, [first + at, first + at + 1], [0; 3], 0, inner);
+        block.load::<HELD>(nodes, [first + at, first + at + 1], [0; 3], 0, inner);
         if inner < count {
-            block.load(nodes, [first + last, follower], shift, inner, 1);
+            block.load::<HELD>(nodes, [first + last, follower], shift, inner, 1);
         }
-        block.compute::<L, PERIODIC>(nodes, count);
+        block.compute::<L, PERIODIC, HELD>(nodes, count);
         for k in 0..3 {
             directions[k * plane + at..][..count].copy_from_slice(&block.direction[k][1..][..count]);
             block.direction[k][0] = block.direction[k][count];
@@ -348,7 +399,12 @@ fn set_up<L: Lane, const PERIODIC: bool>(
     }
     let (zero, one) = (L::Scalar::from_f64(0.0), L::Scalar::from_f64(1.0));
     if closed {
-        let [a, b] = [last, 0].map(|i| [directions[i], directions[plane + i], directions[2 * plane + i]]);
+        let [a, mut b] = [last, 0].map(|i| [directions[i], directions[plane + i], directions[2 * plane + i]]);
+        if HELD {
+            for (k, b) in b.iter_mut().enumerate() {
+                *b = *b * nodes.free::<HELD>(first, k);
+            }
+        }
         systems.set(lane, BORDER, 0, &[-(dot(a, b) * nodes.inverse_mass.get(first))]);
     } else {
         systems.set(lane, BORDER, 0, &[zero]);
@@ -360,7 +416,13 @@ fn set_up<L: Lane, const PERIODIC: bool>(
 
 /// Writes the corrections of a line's nodes.
 #[inline(always)]
-fn correct<R: Real>(nodes: &Nodes<R>, line: &Line, directions: &[R], unknowns: &[R], correction: &mut Scatter<R>) {
+fn correct<R: Real, const HELD: bool>(
+    nodes: &Nodes<R>,
+    line: &Line,
+    directions: &[R],
+    unknowns: &[R],
+    correction: &mut Scatter<R>,
+) {
     let (first, n) = (line.first as usize, line.stations as usize);
     let (last, plane) = (n - 1, directions.len() / 3);
     let inverse_mass = nodes.inverse_mass.slice(first, n);
@@ -371,6 +433,11 @@ fn correct<R: Real>(nodes: &Nodes<R>, line: &Line, directions: &[R], unknowns: &
         to[0] = (p[last] * d[last] - p[0] * d[0]) * inverse_mass[0];
         for i in 1..n {
             to[i] = (p[i - 1] * d[i - 1] - p[i] * d[i]) * inverse_mass[i];
+        }
+        if HELD {
+            for i in 0..n {
+                to[i] = to[i] * nodes.free::<HELD>(first + i, k);
+            }
         }
     }
 }

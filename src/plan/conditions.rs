@@ -4,6 +4,15 @@ use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::scene::{Scene, prescribed};
 
+/// Mask of the prescribed components of each of so many nodes, from the node and mask of each condition.
+pub fn masks(conditions: &[u32], count: usize) -> Vec<u32> {
+    let mut masks = vec![0; count];
+    for condition in conditions.chunks_exact(2) {
+        masks[condition[0] as usize] = condition[1];
+    }
+    masks
+}
+
 /// Tables of prescribed motion.
 #[derive(Default)]
 pub struct Conditions {
@@ -42,6 +51,16 @@ impl Conditions {
     /// Number of conditions.
     pub fn count(&self) -> usize {
         self.nodes.len() / 2
+    }
+
+    /// Whether some nodes are prescribed along some axes only.
+    pub fn is_partial(&self) -> bool {
+        self.nodes.chunks_exact(2).any(|condition| condition[1] != 7)
+    }
+
+    /// Mask of the prescribed components of each of so many nodes.
+    pub fn masks(&self, count: usize) -> Vec<u32> {
+        masks(&self.nodes, count)
     }
 
     /// Final position of each prescribed node, mm.

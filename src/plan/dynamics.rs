@@ -78,6 +78,8 @@ pub(super) struct Held {
     pub reaction: Buffer,
     /// Work of reactions.
     pub work: Buffer,
+    /// Mask of the prescribed components of each node, if some nodes on fibre lines are prescribed along some axes only.
+    pub partly: Option<Buffer>,
 }
 
 impl Held {
@@ -96,7 +98,9 @@ impl Held {
         let kernel = flagged!(Prescribed; t.active.damping);
         let stage = Stage::new("prescribed", kernel, (count, NODE_GRAIN), &wires, params);
         b.plan.step.push(stage.in_units(&units.conditions, false));
-        Some(Self { count, nodes: at, reaction, work })
+        let partly = (t.active.fibre_lines && t.conditions.is_partial())
+            .then(|| b.indices("prescribed components", t.conditions.masks(nodes.count)));
+        Some(Self { count, nodes: at, reaction, work, partly })
     }
 }
 
@@ -113,18 +117,13 @@ pub(super) fn fibre_lines(
     let lines = b.indices("fibre lines", bytemuck::cast_slice(&t.lines).to_vec());
     let stiffness = b.table("line stiffness", t.line_stiffness());
     let &Nodes { reference, quanta, remainder, acceleration, inverse_mass, .. } = nodes;
-    let wires = wires![lines, stiffness, reference, quanta, remainder, acceleration, inverse_mass, correction];
+    let held = held.and_then(|held| held.partly);
+    let wires = wires![lines, stiffness, reference, quanta, remainder, acceleration, inverse_mass, held, correction];
     let params = fibre_lines::Params { beta: chosen.beta as f32 };
     let longest = t.lines.iter().filter(|line| line.has_fibres()).map(|line| line.nodes().len()).max().unwrap_or(1);
-    let kernel = flagged!(FibreLines; t.active.periodic);
+    let kernel = flagged!(FibreLines; t.active.periodic, held.is_some());
     let stage = Stage::new("fibre lines", kernel, (t.lines.len(), 1), &wires, params).in_units(&units.lines, false);
     b.plan.step.push(Stage { constants: vec![("STATIONS", longest)], ..stage });
-    if let Some(held) = held {
-        let wires = wires![nodes: held.nodes, correction];
-        let kernel = Code::of::<prescribed::Hold>();
-        let stage = Stage::new("hold", kernel, (held.count, NODE_GRAIN), &wires, [0u32; 0]);
-        b.plan.step.push(stage.in_units(&units.conditions, false));
-    }
     Some(correction)
 }
 

@@ -34,6 +34,7 @@ use crate::settings::effects::FibreLines;
 use beams::{Beams, Bends};
 use builder::Builder;
 use conditions::Conditions;
+pub use conditions::masks;
 pub use contact::FaceBuffers;
 use contact::{ContactParts, ContactScene, PairBuffers};
 use dynamics::{Assembled, Held};

@@ -87,6 +87,8 @@ pub struct Buffers {
     pub pair_keys: Option<Buffer>,
     pub pair_state: Option<Buffer>,
     pub prescribed: Option<Buffer>,
+    /// Mask of the prescribed components of each node, if fibre lines need it.
+    pub partly: Option<Buffer>,
     pub reaction: Option<Buffer>,
     /// Slip of each contact point of threads and of yarns since the start, mm.
     pub slip: [Option<Buffer>; 2],
@@ -179,6 +181,7 @@ impl Buffers {
             pair_keys: pairs.map(|p| p.keys),
             pair_state: pairs.map(|p| p.state),
             prescribed: held.as_ref().map(|held| held.nodes),
+            partly: held.as_ref().and_then(|held| held.partly),
             reaction: held.as_ref().map(|held| held.reaction),
             slip,
         }

@@ -167,7 +167,7 @@ impl Found<'_> {
         let model = &self.simulation.model;
         if model.active.fibre_lines {
             let cause = format!("{}; fibres and threads of two nodes or more", self.written("effects.fibre_lines"));
-            self.add("fibre lines", cause, &["fibre lines", "hold"], Some(|l| l.case.effects.fibre_lines = None));
+            self.add("fibre lines", cause, &["fibre lines"], Some(|l| l.case.effects.fibre_lines = None));
         }
         if model.active.contact_mass {
             let cause = format!("{}; bodies can touch", self.written("effects.contact_mass"));

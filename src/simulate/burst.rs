@@ -7,6 +7,7 @@ use crate::contact::status;
 use crate::error::Result;
 use crate::kernel::buffer::Initial;
 use crate::kernel::row::Row;
+use crate::plan;
 
 impl Simulation {
     /// Runs some steps, then a search if the skin is used up. If `looks`, returns the totals of the last step.
@@ -100,6 +101,10 @@ impl Simulation {
                 condition[1] = if *after <= passed { condition[1] } else { 0 };
             }
             self.backend.set_bytes(buffer, bytemuck::cast_slice(&masked));
+            if let Some(partly) = self.model.buffers.partly {
+                let masks = plan::masks(&masked, self.scene.mesh.nodes.len());
+                self.backend.set_bytes(partly, bytemuck::cast_slice(&masks));
+            }
         }
     }
 }

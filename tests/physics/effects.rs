@@ -196,7 +196,7 @@ fn a_scene_without_an_effect_has_no_trace_of_it() {
         },
         absent(
             "fibre lines",
-            &["fibre lines", "line stiffness", "line correction", "correction", "stage hold"],
+            &["fibre lines", "line stiffness", "line correction", "correction"],
             &free,
             &[("/effects/fibre_lines", Value::Null)],
         ),
@@ -220,7 +220,7 @@ fn a_scene_without_an_effect_has_no_trace_of_it() {
         ),
         absent(
             "prescribed motion",
-            &["prescribed", "reactions", "stage hold", "row.motion"],
+            &["prescribed", "reactions", "row.motion"],
             &free,
             &[("/domain/mesh/conditions", json!([])), ("/steps/1", json!({ "hold": { "time_s": 1e-4 } }))],
         ),

@@ -407,3 +407,39 @@ fn blocks_of_two_laws_move_as_if_alone() {
     assert!(rubber_energy > 0.0 && yarn_energy > 0.0);
     near("energy", energy, rubber_energy + yarn_energy, 1e-6);
 }
+
+/// Half of a body whose plane of symmetry is held along its normal moves as the whole one, with fibre lines across that plane and time
+/// steps that need them.
+#[test]
+fn half_a_body_on_its_plane_of_symmetry_moves_as_the_whole() {
+    let yarn = |low: f64, slices| {
+        let corners = [[low, -0.3, -0.2], [1.0, 0.3, 0.2]];
+        let block = block("yarn", [slices, 2, 2], corners, DENSITY, crate::common::charmetant());
+        let mut case = scene(json!([block]));
+        case["integration"] = json!({ "dt_s": 1e-7, "energy_tolerance": 100 });
+        case["effects"]["fibre_lines"] = json!({});
+        case
+    };
+    let plane = json!([{ "within": [[0, -9, -9], [0, 9, 9]], "components": [true, false, false] }]);
+    let half = with(yarn(0.0, 4), &[("/domain/mesh/conditions", plane)]);
+    let [whole, half] = [yarn(-1.0, 8), half].map(|case| {
+        let mut simulation = start(&case, F64);
+        // stretched, bent and pressed alike on both sides
+        let velocity =
+            |x: &[f64; 3]| [20.0 * x[0] * (1.0 + x[2]), 300.0 * x[0] * x[0] - 50.0 * x[1], 200.0 * x[2] * x[0].abs()];
+        let velocities: Vec<[f64; 3]> = simulation.mesh().nodes.iter().map(velocity).collect();
+        simulation.set_velocities(&velocities);
+        advance(&mut simulation, 2e-4);
+        simulation
+    });
+    below("balance of the half body", half.health().balance.abs(), 1e-2);
+    let moved = half.fluctuations();
+    let farthest = moved.iter().map(|w| norm(*w)).fold(0.0, f64::max);
+    for (node, w) in half.mesh().nodes.iter().zip(&moved) {
+        let same = |x: &[f64; 3]| norm([0, 1, 2].map(|k| x[k] - node[k])) < 1e-6;
+        let other = whole.mesh().nodes.iter().position(same).unwrap();
+        let apart = norm([0, 1, 2].map(|k| whole.fluctuations()[other][k] - w[k]));
+        assert!(apart < 1e-6 * farthest, "{node:?}: {apart:e} mm apart, moved by up to {farthest} mm");
+    }
+    assert!(farthest > 1e-3);
+}
