@@ -55,7 +55,7 @@ impl Conditions {
 
     /// Whether some nodes are prescribed along some axes only.
     pub fn is_partial(&self) -> bool {
-        self.nodes.chunks_exact(2).any(|condition| condition[1] != 7)
+        self.nodes.chunks_exact(2).any(|condition| ![0, 7].contains(&condition[1]))
     }
 
     /// Mask of the prescribed components of each of so many nodes.

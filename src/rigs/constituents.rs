@@ -90,20 +90,19 @@ pub(super) fn grip(name: &str, nodes: Vec<usize>, displacement: f64) -> Motion {
     Motion { name: name.into(), nodes, components: [true; 3], displacement: [displacement, 0.0, 0.0], after: 0 }
 }
 
-/// Refuses load steps that only a piece of fabric has, and a pull that moves nothing.
-pub(super) fn steps(case: &Case, domain: &str, displacement: f64, provenance: &Provenance) -> Result<()> {
+/// Refuses load steps that only a piece of fabric has, and a pull, given at a path of the case, that moves nothing.
+pub(super) fn steps(case: &Case, path: &str, displacement: f64, provenance: &Provenance) -> Result<()> {
     super::check::steps(case, provenance, |step| match step {
         Step::Shear { .. } => Some("shear needs a periodic cell: use domain.cell, or move the grip"),
         Step::Stretch { .. } => Some("only a cell has a stretch of its own: move the grip"),
         Step::Pretension { .. } => Some("nothing is stitched here that could tighten: remove it"),
         _ => None,
     })?;
-    let path = format!("domain.{domain}.displacement_mm");
     if displacement == 0.0 {
-        return Err(provenance.error(&path, "is 0, so that nothing is loaded: give a displacement"));
+        return Err(provenance.error(path, "is 0, so that nothing is loaded: give a displacement"));
     }
     if case.steps.iter().all(|step| !matches!(step, Step::Move { .. })) {
-        return Err(provenance.error(&path, "is never applied: add a move step"));
+        return Err(provenance.error(path, "is never applied: add a move step"));
     }
     Ok(())
 }

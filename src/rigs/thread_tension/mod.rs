@@ -16,7 +16,7 @@ impl Rig for ThreadTension {
     fn check(&self, case: &Case, provenance: &Provenance) -> Result<()> {
         check::fabric(case, "thread", provenance)?;
         unused(case, &case.resolution, "a thread, whose beams are counted in its domain", provenance)?;
-        steps(case, "thread_tension", self.displacement_mm, provenance)
+        steps(case, "domain.thread_tension.displacement_mm", self.displacement_mm, provenance)
     }
 
     fn piece(&self, case: &Case) -> Result<Piece> {

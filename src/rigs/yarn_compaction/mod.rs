@@ -39,7 +39,7 @@ impl Rig for YarnCompaction {
             let message = "needs a yarn of the charmetant law with a k_comp_mpa above 0, which the test evaluates";
             return Err(provenance.error("domain.yarn_compaction", message));
         }
-        steps(case, "yarn_compaction", thickness - self.thickness_mm, provenance)
+        steps(case, "domain.yarn_compaction.thickness_mm", thickness - self.thickness_mm, provenance)
     }
 
     fn piece(&self, case: &Case) -> Result<Piece> {

@@ -33,7 +33,7 @@ fn stiffness(yarn: &Yarn) -> Option<f64> {
 impl Rig for YarnShear {
     fn check(&self, case: &Case, provenance: &Provenance) -> Result<()> {
         check::fabric(case, "yarn", provenance)?;
-        steps(case, "yarn_shear", self.displacement_mm, provenance)?;
+        steps(case, "domain.yarn_shear.displacement_mm", self.displacement_mm, provenance)?;
         unused(case, &resolution_of(case, self.ply, false), "this yarn", provenance)?;
         let (yarn, _) = yarn_of(case, self.ply)?;
         if stiffness(yarn).is_none_or(|stiffness| stiffness == 0.0) {
