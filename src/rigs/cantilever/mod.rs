@@ -24,8 +24,8 @@ impl Rig for Cantilever {
             Step::Settle { .. } | Step::Hold { .. } => None,
             _ => Some("a cantilever is loaded by its weight alone: use settle"),
         })?;
-        if case.effects.gravity_mm_s2.is_none_or(|[x, y, z]| x != 0.0 || y != 0.0 || z >= 0.0) {
-            let message = "a cantilever bends under its weight, down along z: give [0, 0, -9810]";
+        if case.effects.gravity_mm_s2.is_none_or(|[x, y, z]| x != 0.0 || y >= 0.0 || z != 0.0) {
+            let message = "a cantilever bends under its weight, down along y, as pictures show it: give [0, -9810, 0]";
             return Err(provenance.error("effects.gravity_mm_s2", message));
         }
         if !case.effects.bending {

@@ -30,7 +30,7 @@ pub(super) struct Bent {
 impl Bent {
     pub(super) fn of(rig: &domain::Cantilever, case: &Case, tables: &Tables) -> Result<Self> {
         let stitch = &case.fabric()?.stitch;
-        let [_, _, fall] = case.effects.gravity_mm_s2.unwrap_or_default();
+        let [_, fall, _] = case.effects.gravity_mm_s2.unwrap_or_default();
         Ok(Self {
             length: rig.length_mm,
             weight: -fall * stitch.linear_density_tex * TONNES_PER_MM_OF_TEX,
@@ -51,9 +51,9 @@ impl Observer for Bent {
         let positions = simulation.shape().positions;
         simulation.alive()?;
         // the clamp holds the first beam by its middle
-        let clamp = [0, 2].map(|k| 0.5 * (positions[0][k] + positions[1][k]));
+        let clamp = [0, 1].map(|k| 0.5 * (positions[0][k] + positions[1][k]));
         let tip = positions[positions.len() - 1];
-        let [along, down] = [tip[0] - clamp[0], clamp[1] - tip[2]];
+        let [along, down] = [tip[0] - clamp[0], clamp[1] - tip[1]];
         let angle = libm::atan2(down, along);
         let by_elastica = stiffness(angle, self.length, self.weight);
         self.last = by_elastica.map(|by_elastica| [peirce(angle, self.length, self.weight), by_elastica]);
