@@ -135,8 +135,9 @@ impl<R: Real> Group<'_, R> {
                 (start..end).step_by(*grain).map(|first| first..(first + grain).min(end)).collect()
             }
             Cut::Units(units) => {
+                // the last units first: the longest, the lines of threads, are behind those of yarns
                 let last = units.len() - 1;
-                (0..last).step_by(UNITS).map(|unit| units[unit]..units[last.min(unit + UNITS)]).collect()
+                (0..last).step_by(UNITS).rev().map(|unit| units[unit]..units[last.min(unit + UNITS)]).collect()
             }
         };
         let continues = number > 0 && stage.order == Order::Follows;
