@@ -158,9 +158,9 @@ impl Done {
             }
             Curve::Shear => {
                 curve = sheared(&Columns::read(&folder.join("history.csv"))?);
-                // until the load first turns back
-                let turn =
-                    curve.windows(2).position(|pair| pair[1][0] <= pair[0][0]).map_or(curve.len(), |last| last + 1);
+                // up to the largest angle, from where the load turns back
+                let farthest = (0..curve.len()).max_by(|a, b| curve[*a][0].total_cmp(&curve[*b][0]));
+                let turn = farthest.map_or(0, |last| last + 1);
                 let end = curve[..turn].last().map_or(0.0, |[angle, _]| *angle);
                 for angle in ANGLES.into_iter().filter(|angle| *angle <= end + NEAR) {
                     numbers.push(given(format!("F_nor at {angle}°"), "N/mm", value(&curve[..turn], angle.min(end))));

@@ -46,7 +46,7 @@ pub(super) fn write(done: &[Done], fabric: &str, path: &Path) -> Result<()> {
         &|curve| curve == Curve::Shear,
         "Shear force F_nor, N/mm",
         ["shear angle, degrees", "N/mm"],
-        "Loading and unloading. A specimen is shown over the angle that the displacement of its clamps states.",
+        "Loading and unloading. A specimen is shown over the effective angle of its zone of pure shear.",
     );
     figure(
         &mut page,
