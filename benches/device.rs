@@ -91,7 +91,8 @@ fn main() {
         "beams": beams, "nodes": nodes, "steps": steps, "us_per_step": 1e6 * step, "hexes_per_s": hexes as f64 / step,
         "recording_us_per_step": recording, "waiting_us_per_step": waiting, "dispatches_per_step": dispatches,
         "submissions_per_1000_steps": submissions, "waits_per_1000_steps": waits, "searches_per_1000_steps": found,
-        "bytes_read_per_1000_steps": bytes, "row_s": row, "frame_s": frame, "mm_from_cpu": apart, "device_bytes_per_s": rates.bytes, "device_operations_per_s": rates.operations,
+        "bytes_read_per_1000_steps": bytes, "row_s": row, "frame_s": frame, "mm_from_cpu": apart,
+        "device_bytes_per_s": rates.bytes, "device_operations_per_s": rates.operations,
         "stages": stages
     });
     println!("{table}");

@@ -10,7 +10,6 @@ use crate::kernel::interface::{Access, Slot};
 use crate::kernel::io::{Binding, Io};
 use crate::kernel::lane::{Isa, Real};
 use crate::kernel::row::Row;
-
 use crate::kernel::stage::{Code, Cut, Order, Stage};
 use rayon::prelude::*;
 use std::ops::Range;

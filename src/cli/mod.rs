@@ -80,7 +80,7 @@ pub fn perform(command: Command) -> Result<Done> {
                 quiet,
             };
             let found = characterise(&fabric, &set, &options)?;
-            let code = if found.interrupted { INTERRUPTED } else { u8::from(found.stopped.is_some()) * STOPPED };
+            let code = if found.interrupted { INTERRUPTED } else { u8::from(found.stopped) * STOPPED };
             return Ok(Done { text: found.text, code });
         }
         Command::Study { study: StudyCommand::Accuracy { case, output, points, backend, threads, quiet } } => {

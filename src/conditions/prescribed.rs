@@ -7,7 +7,6 @@ use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position;
 use crate::kernel::shader::{Shader, when};
-
 use crate::kernel::stage::Kernel;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;

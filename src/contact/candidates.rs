@@ -21,7 +21,6 @@ use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, when};
-
 use crate::kernel::stage::Kernel;
 use crate::kernel::vector::Vector;
 use std::ops::Range;

@@ -16,7 +16,6 @@ use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, when};
-
 use crate::kernel::stage::Kernel;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};

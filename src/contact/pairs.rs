@@ -19,7 +19,6 @@ use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::{Displacements, Lattice};
 use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, when};
-
 use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{Vector, add, apply, sub};
 use std::ops::Range;

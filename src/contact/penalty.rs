@@ -25,7 +25,6 @@ use crate::kernel::position;
 use crate::kernel::row::Row;
 use crate::kernel::scratch;
 use crate::kernel::shader::{Shader, Share, when};
-
 use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{fma, norm};
 use std::ops::Range;

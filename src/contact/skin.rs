@@ -28,7 +28,6 @@ use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
 use crate::kernel::position::{self, MOST_MM, difference, in_mm};
 use crate::kernel::shader::{Shader, when};
-
 use crate::kernel::stage::Kernel;
 use crate::kernel::vector::dot;
 use std::ops::Range;

@@ -6,7 +6,6 @@ use crate::kernel::interface::{Slot, slot};
 use crate::kernel::io::Io;
 use crate::kernel::lane::Lane;
 use crate::kernel::shader::{Shader, when};
-
 use crate::kernel::stage::Kernel;
 use std::ops::Range;
 

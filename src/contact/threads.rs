@@ -21,7 +21,6 @@ use crate::kernel::node::Field;
 use crate::kernel::position;
 use crate::kernel::row::Row;
 use crate::kernel::shader::{Shader, when};
-
 use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{add, apply, dot, fma, norm, scale, sub};
 use std::ops::Range;

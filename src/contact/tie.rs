@@ -9,7 +9,6 @@ use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Displacements;
 use crate::kernel::position;
 use crate::kernel::shader::Shader;
-
 use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{dot, fma, scale};
 use std::ops::Range;

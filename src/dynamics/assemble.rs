@@ -16,7 +16,6 @@ use crate::kernel::interface::{Constant, Slot, constants, slot};
 use crate::kernel::io::{Io, raise};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::shader::{Shader, when};
-
 use crate::kernel::stage::Kernel;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;

@@ -9,7 +9,6 @@ use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Field;
 use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::shader::{Shader, Share, when};
-
 use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{add, apply, dot};
 use bytemuck::{Pod, Zeroable};

@@ -36,7 +36,6 @@ use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::{self, QUANTUM};
 use crate::kernel::scratch;
 use crate::kernel::shader::{Shader, Share, when};
-
 use crate::kernel::stage::Kernel;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;

@@ -12,7 +12,6 @@ use crate::kernel::io::{Io, raise};
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::position::{self, carry};
 use crate::kernel::shader::{Shader, when};
-
 use crate::kernel::stage::Kernel;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;

@@ -27,7 +27,6 @@ use crate::kernel::interface::{Constant, Slot, constants, joined, slot};
 use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::shader::{Shader, when};
-
 use crate::kernel::stage::Kernel;
 use crate::kernel::vector::norm;
 use bytemuck::{Pod, Zeroable};

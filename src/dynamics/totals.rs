@@ -10,7 +10,6 @@ use crate::kernel::interface::{Slot, constants, slot};
 use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real};
 use crate::kernel::shader::{Shader, Share, WORKGROUP, when};
-
 use crate::kernel::stage::Kernel;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;

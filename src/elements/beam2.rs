@@ -10,7 +10,6 @@ use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Displacements;
 use crate::kernel::position;
 use crate::kernel::shader::{Shader, when};
-
 use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{add, apply, dot, norm, scale};
 use std::ops::Range;

@@ -12,7 +12,6 @@ use crate::kernel::lane::{Lane, Real};
 use crate::kernel::node::Displacements;
 use crate::kernel::position;
 use crate::kernel::shader::{Shader, when};
-
 use crate::kernel::stage::Kernel;
 use crate::kernel::vector::{add, cross, dot, norm, scale, sub};
 use std::ops::Range;

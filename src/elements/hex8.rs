@@ -13,7 +13,6 @@ use crate::kernel::interface::{Constant, Slot, constants, slot};
 use crate::kernel::io::Io;
 use crate::kernel::lane::{Lane, Real, Work};
 use crate::kernel::shader::Shader;
-
 use crate::kernel::stage::Kernel;
 use crate::kernel::two::Two;
 use crate::materials::{Material, PARAMETERS, Tensor, jacobian};

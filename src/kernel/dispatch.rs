@@ -153,11 +153,9 @@ impl<'a> Dispatch<'a> {
         let parts = parts.collect::<Result<Vec<_>>>()?;
         let defined: Vec<_> = self.stages.iter().flat_map(|stage| stage.kernel.shader.defines).copied().collect();
         let row = Text::row(self.stages[0].kernel.shader, &defined)?;
-        let of_row: Vec<&str> = declared(&row.text).collect();
-        let mut text = Text::default();
-        if parts.iter().any(|part| of_row.iter().any(|name| part.words().contains(name))) {
-            text.append(row.clone());
-        }
+        let words: Vec<_> = parts.iter().map(Text::words).collect();
+        let reads_row = declared(&row.text).any(|name| words.iter().any(|words| words.contains(name)));
+        let mut text = if reads_row { row } else { Text::default() };
         let bound = self.bound().expect("stages with other needs have dispatches of their own");
         let name = |number: usize| {
             if links == 1 { bound[number].name.to_owned() } else { format!("{}_{number}", bound[number].name) }

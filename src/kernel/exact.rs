@@ -8,7 +8,6 @@ use super::io::Io;
 use super::lane::{Lane, Real};
 use super::position::{self, QUANTUM, carry, quanta};
 use super::shader::{Shader, Share, WORKGROUP};
-
 use super::stage::Kernel;
 use std::ops::Range;
 use std::sync::atomic::Ordering;

@@ -170,6 +170,11 @@ pub(super) fn section(results: &Results, page: &mut Page) -> Vec<String> {
     vec![found]
 }
 
+/// The chart of the force over the displacement of a grip.
+pub(super) fn force(results: &Results, page: &mut Page, caption: &str) {
+    results.chart(page, &results.history, &results.axis(), ["Force", "N"], &[("force_n", "force")], caption);
+}
+
 /// Evaluates a stiffness from the slope of force over displacement while a grip moves.
 pub(super) struct Pull {
     /// Name of the property and the stiffness of the piece, N/mm, for a property of one.

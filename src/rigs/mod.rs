@@ -62,7 +62,9 @@ pub trait Rig {
     fn sections(&self, case: &Case, results: &Results, page: &mut Page) -> Result<Vec<String>>;
 
     /// History columns of the abscissa and of the force.
-    fn columns(&self, results: &Results) -> Vec<&'static str>;
+    fn columns(&self, results: &Results) -> Vec<&'static str> {
+        vec![results.axis().column, "force_n"]
+    }
 
     /// Frees the ends of cut threads.
     fn free_thread_ends(&mut self) {}

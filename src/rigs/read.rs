@@ -24,9 +24,12 @@ pub struct Loaded {
 /// Reads a case file, loads the fabric file it names (relative to the case), applies `path=value` overrides in order, and
 /// performs all checks that need no mesh.
 pub fn read(path: &Path, overrides: &[String]) -> Result<Loaded> {
-    let mut provenance = Provenance { case: path.into(), ..Provenance::default() };
+    overridden(parse::file(path)?, Provenance { case: path.into(), ..Provenance::default() }, overrides)
+}
+
+/// Applies overrides to a case, loads the fabric file that it names, if any, and checks it.
+fn overridden(mut value: Value, mut provenance: Provenance, overrides: &[String]) -> Result<Loaded> {
     let schema = schema::case();
-    let mut value = parse::file(path)?;
     for text in overrides {
         let set = Override::read(text)?;
         if set.path == "fabric" {
@@ -51,17 +54,6 @@ pub fn of_fabric(name: &str, case: &str, fabric: &Path, overrides: &[String]) ->
     let mut value = parse::parse(case).map_err(|fault| provenance.error("", fault.to_string()))?;
     value["fabric"] = parse::file(fabric)?;
     overridden(value, provenance, overrides)
-}
-
-/// Applies overrides to a value with inline fabric, and checks it.
-fn overridden(mut value: Value, mut provenance: Provenance, overrides: &[String]) -> Result<Loaded> {
-    let schema = schema::case();
-    for text in overrides {
-        let set = Override::read(text)?;
-        set.apply(&mut value, &schema)?;
-        provenance.overrides.push(set);
-    }
-    checked(value, provenance, &schema)
 }
 
 /// Checks a JSON value with inline fabric as if it were a case file.

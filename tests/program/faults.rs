@@ -17,7 +17,6 @@ use tricot::kernel::interface::Slot;
 use tricot::kernel::io::Io;
 use tricot::kernel::lane::{Lane, Real};
 use tricot::kernel::shader::Shader;
-
 use tricot::kernel::stage::{Kernel, Stage};
 use tricot::output::checkpoint::Checkpoint;
 use tricot::settings::integration::Precision::{F32, F64};

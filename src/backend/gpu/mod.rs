@@ -51,8 +51,8 @@ pub struct Gpu {
     shapes: Vec<(Kind, usize)>,
     rows: wgpu::Buffer,
     row_group: wgpu::BindGroup,
-    /// By [`key`].
-    bound: HashMap<u64, Bound>,
+    /// Dispatches of lists of stages, by [`key`].
+    bound: HashMap<u64, Vec<Bound>>,
     saved: Vec<(Buffer, wgpu::Buffer)>,
     work: RefCell<Work>,
 }
@@ -185,7 +185,7 @@ impl Gpu {
     }
 
     /// Records dispatches for rows in place; each in its own pass if timed.
-    fn record(&self, work: &mut Work, ready: &[&Bound], rows: &[u32], timed: bool) {
+    fn record(&self, work: &mut Work, ready: &[Bound], rows: &[u32], timed: bool) {
         let dispatch = |pass: &mut wgpu::ComputePass, bound: &Bound| {
             pass.set_pipeline(&bound.pipeline.pipeline);
             pass.set_bind_group(1, &bound.buffers, &[]);
@@ -212,7 +212,7 @@ impl Gpu {
     }
 
     /// Whether a call of a list of dispatches, each run `rows` times, is timed.
-    fn counts(&self, ready: &[&Bound], rows: u64) -> bool {
+    fn counts(&self, ready: &[Bound], rows: u64) -> bool {
         let work = &mut *self.work.borrow_mut();
         let mut timed = false;
         for bound in ready {
@@ -227,10 +227,10 @@ impl Gpu {
     }
 }
 
-/// Hash that identifies a dispatch among those of its plan.
-fn key(dispatch: &Dispatch) -> u64 {
+/// Hash that identifies a list of stages among the lists of its plan.
+fn key(stages: &[Stage]) -> u64 {
     let mut hasher = DefaultHasher::new();
-    for stage in dispatch.stages() {
+    for stage in stages {
         (stage.kernel.shader, stage.first, stage.count, &stage.reads, &stage.params).hash(&mut hasher);
         stage.writes.iter().for_each(|(buffer, _)| buffer.hash(&mut hasher));
     }
@@ -239,18 +239,17 @@ fn key(dispatch: &Dispatch) -> u64 {
 
 impl Backend for Gpu {
     fn run(&mut self, stages: &[Stage], rows: &[Row<f64>]) {
-        let mut keys = Vec::new();
-        for dispatch in Dispatch::of(stages, self.device.storage_buffers()) {
-            keys.push(key(&dispatch));
-            if !self.bound.contains_key(&key(&dispatch)) {
-                match Bound::new(&self.device, &dispatch, &self.buffers) {
-                    Ok(bound) => _ = self.bound.insert(key(&dispatch), bound),
-                    Err(error) => return self.device.note(&error.to_string()),
-                }
+        let list = key(stages);
+        if !self.bound.contains_key(&list) {
+            let dispatches = Dispatch::of(stages, self.device.storage_buffers());
+            let bound = dispatches.iter().map(|dispatch| Bound::new(&self.device, dispatch, &self.buffers));
+            match bound.collect::<Result<_>>() {
+                Ok(bound) => _ = self.bound.insert(list, bound),
+                Err(error) => return self.device.note(&error.to_string()),
             }
         }
-        let ready: Vec<&Bound> = keys.iter().map(|key| &self.bound[key]).collect();
-        let timed = self.counts(&ready, rows.len() as u64);
+        let ready = &self.bound[&list];
+        let timed = self.counts(ready, rows.len() as u64);
         let (mut left, started) = (rows, Instant::now());
         while !left.is_empty() {
             let most = ((LONGEST / self.work.borrow().pace) as usize).clamp(1, SUBMITTED);
@@ -272,10 +271,10 @@ impl Backend for Gpu {
             let offsets: Vec<u32> = (0..now.len() as u64).map(|i| (first + i * ROW_STRIDE) as u32).collect();
             let (plain, last) = offsets.split_at(offsets.len() - usize::from(timed && left.is_empty()));
             if !plain.is_empty() {
-                self.record(&mut work, &ready, plain, false);
+                self.record(&mut work, ready, plain, false);
             }
             if !last.is_empty() {
-                self.record(&mut work, &ready, last, true);
+                self.record(&mut work, ready, last, true);
             }
             drop(work);
             if !left.is_empty() {

@@ -65,8 +65,4 @@ impl Rig for Cantilever {
     fn sections(&self, _: &Case, results: &Results, page: &mut Page) -> Result<Vec<String>> {
         Ok(section(results, page))
     }
-
-    fn columns(&self, _: &Results) -> Vec<&'static str> {
-        vec!["time_s", "force_n"]
-    }
 }

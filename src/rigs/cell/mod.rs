@@ -4,6 +4,8 @@ mod check;
 mod observer;
 mod page;
 
+pub use page::tension;
+
 use super::observer::{Observer, Tables};
 use super::{Piece, Rig, crossings};
 use crate::case::Case;

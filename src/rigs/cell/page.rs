@@ -6,14 +6,18 @@ use crate::output::columns::Columns;
 use crate::output::page::Page;
 use crate::output::results::Results;
 
-/// Membrane force along the fibres of each ply over their strain, while the cell is stretched.
-fn tension(results: &Results, stress: &Columns, page: &mut Page) {
+/// Membrane force along the fibres of a ply, N/mm, over their strain, %, in every row.
+pub fn tension(stress: &Columns, ply: &str) -> Vec<[f64; 2]> {
+    let [stretches, forces] = ["stretch", "membrane_n_per_mm"].map(|column| stress.numbers(&format!("{ply}_{column}")));
+    stretches.into_iter().zip(forces).map(|(stretch, force)| [100.0 * (stretch - 1.0), force]).collect()
+}
+
+/// The tension of each ply while the cell is stretched.
+fn tensions(results: &Results, stress: &Columns, page: &mut Page) {
     let phases = results.history.texts("phase");
     let curve = |ply: &'static str| {
-        let [stretches, forces] =
-            ["stretch", "membrane_n_per_mm"].map(|column| stress.numbers(&format!("{ply}_{column}")));
-        let rows = stretches.iter().zip(forces).zip(&phases).filter(|(_, phase)| **phase == "stretch");
-        let points = rows.map(|((stretch, force), _)| [100.0 * (stretch - 1.0), force]).collect();
+        let rows = tension(stress, ply).into_iter().zip(&phases);
+        let points = rows.filter(|(_, phase)| **phase == "stretch").map(|(point, _)| point).collect();
         Curve { name: ply, points, spread: Vec::new() }
     };
     if let Some(svg) = chart::curves(["strain, %", "N/mm"], &["warp", "weft"].map(curve)) {
@@ -34,7 +38,7 @@ pub(super) fn curves(results: &Results, page: &mut Page) -> Result<()> {
             results.chart(page, &stress, &axis, ["Membrane force", "N/mm"], &fibres, caption);
         }
     } else if let Some(stress) = results.other("stress.csv")? {
-        tension(results, &stress, page);
+        tensions(results, &stress, page);
     }
     if let Some(shear) = results.other("shear.csv")? {
         let angles = [

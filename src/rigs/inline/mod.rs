@@ -5,6 +5,7 @@ mod conditions;
 mod mesh;
 mod observer;
 
+use super::constituents::force;
 use super::observer::{Observer, Tables};
 use super::{Piece, Rig};
 use crate::case::Case;
@@ -32,16 +33,12 @@ impl Rig for InlineMesh {
 
     fn curves(&self, results: &Results, page: &mut Page) -> Result<()> {
         let caption = "Of the grips on their largest displacement; each of them is in reactions.csv.";
-        results.chart(page, &results.history, &results.axis(), ["Force", "N"], &[("force_n", "force")], caption);
+        force(results, page, caption);
         Ok(())
     }
 
     fn sections(&self, _: &Case, _: &Results, _: &mut Page) -> Result<Vec<String>> {
         Ok(Vec::new())
-    }
-
-    fn columns(&self, results: &Results) -> Vec<&'static str> {
-        vec![results.axis().column, "force_n"]
     }
 
     fn relax_threads(&mut self) {

@@ -1,6 +1,6 @@
 //! Tension of a piece of the stitching thread (Fig. 10 and Eq. 8 of Zheng et al.): F = E A ΔL/L.
 
-use super::constituents::{Property, Pull, grip, section, steps, thread, unused};
+use super::constituents::{Property, Pull, force, grip, section, steps, thread, unused};
 use super::observer::{Observer, Tables};
 use super::{Piece, Rig, check};
 use crate::case::Case;
@@ -36,15 +36,11 @@ impl Rig for ThreadTension {
 
     fn curves(&self, results: &Results, page: &mut Page) -> Result<()> {
         let caption = "Of the moved end, over its displacement.";
-        results.chart(page, &results.history, &results.axis(), ["Force", "N"], &[("force_n", "force")], caption);
+        force(results, page, caption);
         Ok(())
     }
 
     fn sections(&self, _: &Case, results: &Results, page: &mut Page) -> Result<Vec<String>> {
         Ok(section(results, page))
-    }
-
-    fn columns(&self, results: &Results) -> Vec<&'static str> {
-        vec![results.axis().column, "force_n"]
     }
 }

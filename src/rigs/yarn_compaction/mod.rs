@@ -85,10 +85,6 @@ impl Rig for YarnCompaction {
     fn sections(&self, _: &Case, results: &Results, page: &mut Page) -> Result<Vec<String>> {
         Ok(section(results, page))
     }
-
-    fn columns(&self, results: &Results) -> Vec<&'static str> {
-        vec![results.axis().column, "force_n"]
-    }
 }
 
 /// The nodes of the lowest (−1) or highest (1) plane along an axis.

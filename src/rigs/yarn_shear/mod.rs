@@ -7,7 +7,7 @@
 //! of two lengths, gives K_sh.
 
 use super::constituents::{
-    Property, Pull, grip, rectangle, resolution_of, section, steps, unused, yarn as yarn_piece, yarn_of,
+    Property, Pull, force, grip, rectangle, resolution_of, section, steps, unused, yarn as yarn_piece, yarn_of,
 };
 use super::observer::{Observer, Tables};
 use super::{Piece, Rig, check};
@@ -72,15 +72,11 @@ impl Rig for YarnShear {
 
     fn curves(&self, results: &Results, page: &mut Page) -> Result<()> {
         let caption = "Of the moved fibres, over their displacement along themselves.";
-        results.chart(page, &results.history, &results.axis(), ["Force", "N"], &[("force_n", "force")], caption);
+        force(results, page, caption);
         Ok(())
     }
 
     fn sections(&self, _: &Case, results: &Results, page: &mut Page) -> Result<Vec<String>> {
         Ok(section(results, page))
-    }
-
-    fn columns(&self, results: &Results) -> Vec<&'static str> {
-        vec![results.axis().column, "force_n"]
     }
 }

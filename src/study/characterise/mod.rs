@@ -11,6 +11,7 @@ use super::results::Results;
 use crate::error::{Error, Result};
 use crate::output::columns::Columns;
 use crate::output::table::{Named, text as number};
+use crate::rigs::cell::tension;
 use crate::rigs::read::{Loaded, of_fabric};
 use crate::run::{self, CASE, Machine};
 use parts::{Curve, PARTS, Part};
@@ -54,8 +55,8 @@ pub struct Characterised {
     pub text: String,
     /// Whether the user stopped it.
     pub interrupted: bool,
-    /// The test that a guard stopped first, if any, and the guard.
-    pub stopped: Option<(String, String)>,
+    /// Whether a guard stopped a test; the table has its words.
+    pub stopped: bool,
 }
 
 /// A number that a test gives.
@@ -91,12 +92,12 @@ pub fn characterise(fabric: &Path, changes: &[String], options: &Options) -> Res
     });
     let loaded: Vec<Loaded> = loaded.collect::<Result<_>>()?;
     std::fs::create_dir_all(&options.output).map_err(|e| Error::file(&options.output, e))?;
-    let (mut done, mut stopped, mut interrupted) = (Vec::new(), None, false);
+    let (mut done, mut stopped, mut interrupted) = (Vec::new(), false, false);
     for (part, loaded) in parts.into_iter().zip(&loaded) {
         let folder = options.output.join(part.name);
         match run_part(loaded, &folder, options) {
             Ok(outcome) => interrupted = outcome,
-            Err(Error::Guard(guard)) => _ = stopped.get_or_insert((part.name.to_owned(), guard.to_string())),
+            Err(Error::Guard(_)) => stopped = true,
             Err(error) => return Err(error),
         }
         done.push(Done::read(part, &folder)?);
@@ -169,10 +170,7 @@ impl Done {
             Curve::Tension { of_warp } => {
                 let stress = Columns::read(&folder.join("stress.csv"))?;
                 let ply = if of_warp { "warp" } else { "weft" };
-                let [stretches, forces] =
-                    ["stretch", "membrane_n_per_mm"].map(|column| stress.numbers(&format!("{ply}_{column}")));
-                let rows = stretches.iter().zip(&forces).map(|(stretch, force)| [100.0 * (stretch - 1.0), *force]);
-                curve = rows.collect();
+                curve = tension(&stress, ply);
                 let far = curve.iter().copied().max_by(|a, b| a[0].total_cmp(&b[0]));
                 numbers.extend(
                     far.map(|[strain, force]| given(format!("membrane force at {strain:.2} %"), "N/mm", force)),

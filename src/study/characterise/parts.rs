@@ -47,6 +47,11 @@ const fn of_constituent(
     Part { name, title, case, changes, quick: &[], is_long: false, curve: Curve::Property }
 }
 
+/// A test of a cell with load steps of its own.
+const fn of_cell(name: &'static str, title: &'static str, steps: &'static [&'static str], curve: Curve) -> Part {
+    Part { name, title, case: CELL, changes: steps, quick: PREVIEW, is_long: false, curve }
+}
+
 /// All tests, in the order in which they run.
 pub(super) const PARTS: &[Part] = &[
     of_constituent("thread-tension", "Tension of the thread", THREAD, &[]),
@@ -59,50 +64,38 @@ pub(super) const PARTS: &[Part] = &[
         &["domain.yarn_shear.ply=weft", r#"resolution={ "weft_columns": 6, "slice_mm": 1 }"#],
     ),
     of_constituent("warp-compaction", "Compaction of a warp in a die", COMPACTION, &[]),
-    Part {
-        name: "shear",
-        title: "Shear of the fabric and back",
-        case: CELL,
-        changes: &[r#"steps=[{ "pretension": { "time_s": 3e-3 } },
+    of_cell(
+        "shear",
+        "Shear of the fabric and back",
+        &[r#"steps=[{ "pretension": { "time_s": 3e-3 } },
             { "stretch": { "warp": "corner_driven", "weft": "corner_driven", "time_s": 0.5e-3 } },
             { "shear": { "angle_deg": 45, "time_s": 13e-3 } }, { "shear": { "angle_deg": 0, "time_s": 13e-3 } }]"#],
-        quick: PREVIEW,
-        is_long: false,
-        curve: Curve::Shear,
-    },
-    Part {
-        name: "shear-other-way",
-        title: "Shear of the fabric the other way and back",
-        case: CELL,
-        changes: &[r#"steps=[{ "pretension": { "time_s": 3e-3 } },
+        Curve::Shear,
+    ),
+    of_cell(
+        "shear-other-way",
+        "Shear of the fabric the other way and back",
+        &[r#"steps=[{ "pretension": { "time_s": 3e-3 } },
             { "stretch": { "warp": "corner_driven", "weft": "corner_driven", "time_s": 0.5e-3 } },
             { "shear": { "angle_deg": -45, "time_s": 13e-3 } }, { "shear": { "angle_deg": 0, "time_s": 13e-3 } }]"#],
-        quick: PREVIEW,
-        is_long: false,
-        curve: Curve::Shear,
-    },
-    Part {
-        name: "warp-tension",
-        title: "Tension of the fabric along the warps, and back",
-        case: CELL,
-        changes: &[r#"steps=[{ "pretension": { "time_s": 3e-3 } }, { "stretch": { "warp": { "to": 1.002 },
+        Curve::Shear,
+    ),
+    of_cell(
+        "warp-tension",
+        "Tension of the fabric along the warps, and back",
+        &[r#"steps=[{ "pretension": { "time_s": 3e-3 } }, { "stretch": { "warp": { "to": 1.002 },
             "weft": { "force_n_per_mm": 0 }, "time_s": 4e-3 } }, { "stretch": { "warp": { "to": 1 },
             "weft": { "force_n_per_mm": 0 }, "time_s": 4e-3 } }]"#],
-        quick: PREVIEW,
-        is_long: false,
-        curve: Curve::Tension { of_warp: true },
-    },
-    Part {
-        name: "weft-tension",
-        title: "Tension of the fabric along the wefts, and back",
-        case: CELL,
-        changes: &[r#"steps=[{ "pretension": { "time_s": 3e-3 } }, { "stretch": { "weft": { "to": 1.002 },
+        Curve::Tension { of_warp: true },
+    ),
+    of_cell(
+        "weft-tension",
+        "Tension of the fabric along the wefts, and back",
+        &[r#"steps=[{ "pretension": { "time_s": 3e-3 } }, { "stretch": { "weft": { "to": 1.002 },
             "warp": { "force_n_per_mm": 0 }, "time_s": 4e-3 } }, { "stretch": { "weft": { "to": 1 },
             "warp": { "force_n_per_mm": 0 }, "time_s": 4e-3 } }]"#],
-        quick: PREVIEW,
-        is_long: false,
-        curve: Curve::Tension { of_warp: false },
-    },
+        Curve::Tension { of_warp: false },
+    ),
     Part {
         name: "bias-extension",
         title: "Bias extension of a small specimen",
