@@ -62,14 +62,15 @@ pub fn check(dir: &Path, force: bool) -> Result<()> {
 /// earlier results.
 ///
 /// A folder that is not empty is refused unless `force` is given. In that case the files of an earlier run are moved to
-/// `dir/previous-1` (or the next free number), and everything else stays in place. The caller owns the folder exclusively while
-/// it holds the returned lock.
+/// `dir/previous-1` (or the next free number); what a run was killed in the midst of writing is removed, and everything else stays
+/// in place. The caller owns the folder exclusively while it holds the returned lock.
 pub fn prepare(dir: &Path, force: bool) -> Result<Lock> {
     check(dir, force)?;
     fs::create_dir_all(dir).map_err(|e| Error::file(dir, format!("cannot create the folder: {}", reason(&e))))?;
     let lock = Lock::take(dir)?;
     // another run may have used the folder in between
     check(dir, force)?;
+    tidy(dir, usize::MAX)?;
     let own: Vec<PathBuf> = list(dir)?.into_iter().filter(|path| is_own(path)).collect();
     if own.is_empty() {
         return Ok(lock);
@@ -144,6 +145,8 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let dir = root.path().join("a/b");
         prepare(&dir, false).unwrap();
+        // a run was killed before it had written its first file
+        fs::write(dir.join("case.json.7.part"), "{").unwrap();
         prepare(&dir, false).unwrap();
         assert!(names(&dir).is_empty());
     }
