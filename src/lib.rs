@@ -43,6 +43,7 @@
 //! | [`elements`] | hexahedra, beams, bending between beams |
 //! | [`contact`] | search and forces: points on closed surfaces, lines on lines, friction |
 //! | [`dynamics`] | assembly, fibre lines, integration, limit of the time step |
+//! | [`tools`] | rigid tools: shapes as signed distances, forces on points, motion |
 //! | [`conditions`] | prescribed motion |
 //! | [`scene`] | the complete input of the solver, independent of the case file |
 //! | [`plan`] | the scene as buffers and stages: the algorithm as data |
@@ -59,7 +60,7 @@
 //!
 //! Imports point one way: a module uses only the modules before it in this list (`tests/program/structure.rs` checks it).
 //! ```text
-//! error kernel settings mesh materials elements contact dynamics conditions scene plan backend measure schedule simulate case fabric output rigs run study
+//! error kernel settings mesh materials elements contact dynamics tools conditions scene plan backend measure schedule simulate case fabric output rigs run study
 //! ```
 //! Moreover, the backend uses only `error` and `kernel`, and `output` does not use `measure`.
 //!
@@ -123,6 +124,7 @@ pub mod settings;
 pub mod simulate;
 #[cfg(feature = "cli")]
 pub mod study;
+pub mod tools;
 
 /// The types that users of the library need most.
 pub mod prelude {

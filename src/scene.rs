@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 /// A scene at rest. Units: mm, N, s, tonne, MPa.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
-    /// Bodies with their laws, and the friction between them.
+    /// Bodies with their laws, rigid tools, and the friction between them.
     pub mesh: Mesh,
     /// Prescribed motion of nodes.
     pub motions: Vec<Motion>,
@@ -69,7 +69,8 @@ pub struct Conflict {
 impl Scene {
     /// Largest prescribed displacement, mm.
     pub fn reach(&self) -> f64 {
-        self.motions.iter().map(|motion| norm(motion.displacement)).fold(0.0, f64::max)
+        let tools = self.mesh.tools.iter().map(|tool| norm(tool.displacement_mm));
+        self.motions.iter().map(|motion| norm(motion.displacement)).chain(tools).fold(0.0, f64::max)
     }
 }
 

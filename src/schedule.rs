@@ -142,6 +142,7 @@ impl Schedule {
         row.radius = now.radius;
         row.radius_increment = now.radius - last.radius;
         row.motion = (next.motion - now.motion) / dt;
+        row.amplitude = now.motion;
         if let Some(phase) = self.phases.get(self.phase_at(time)) {
             [row.damping_solid, row.damping_thread] = phase.damping;
         }

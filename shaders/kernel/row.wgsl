@@ -28,6 +28,7 @@ struct Row {
     damping_solid: f32,
     damping_thread: f32,
     motion: f32,
+    amplitude: f32,
     affine: f32,
     closing: f32,
     searched: f32,

@@ -2,6 +2,7 @@
 
 use crate::settings::friction::Friction;
 use crate::settings::material::Material;
+use crate::settings::tool::Tool;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -243,6 +244,9 @@ pub struct InlineMesh {
     /// Conditions on nodes.
     #[serde(default)]
     pub conditions: Vec<Condition>,
+    /// Rigid tools.
+    #[serde(default)]
+    pub tools: Vec<Tool>,
 }
 
 /// A structured block: fibres run from slice to slice.

@@ -3,10 +3,17 @@
 
 use super::add_force;
 use crate::kernel::lane::Real;
+use crate::kernel::vector::{Vector, scale};
 use std::sync::atomic::{AtomicI32, Ordering};
 
+/// A vector in quanta.
+#[inline(always)]
+pub(crate) fn quanta<R: Real>(v: Vector<R>) -> [i32; 3] {
+    [v[0].to_i32(), v[1].to_i32(), v[2].to_i32()]
+}
+
 /// Sums for some nodes.
-pub(super) struct Joint<const N: usize> {
+pub(crate) struct Joint<const N: usize> {
     pub nodes: [usize; N],
     forces: [[i32; 3]; N],
     stiffness: [i32; N],
@@ -68,6 +75,21 @@ impl<const N: usize> Joint<N> {
         for a in 0..N {
             self.stiffness[a] = self.stiffness[a].wrapping_add((quanta * weights[a].abs()).to_i32());
         }
+    }
+
+    /// Distributes a force by weights: the last node takes the rounding error of the others.
+    #[inline(always)]
+    pub fn share<R: Real>(&mut self, force: [i32; 3], weights: &[R; N]) {
+        let mut rest = force;
+        let all: Vector<R> = [R::from_i32(force[0]), R::from_i32(force[1]), R::from_i32(force[2])];
+        for a in 0..N - 1 {
+            let part = quanta(scale(all, weights[a]));
+            for k in 0..3 {
+                rest[k] = rest[k].wrapping_sub(part[k]);
+            }
+            self.push(a, part);
+        }
+        self.push(N - 1, rest);
     }
 
     /// Adds a force to a node.

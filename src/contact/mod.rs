@@ -17,7 +17,7 @@ pub mod candidates;
 pub mod face;
 pub mod friction;
 pub mod grid;
-mod joint;
+pub(crate) mod joint;
 pub mod look;
 pub mod memory;
 pub mod pairs;
@@ -195,7 +195,7 @@ pub fn add_force(forces: &[AtomicI32], node: usize, quanta: [i32; 3]) {
 
 /// Whether a force component fits its integer; else records the node.
 #[inline(always)]
-fn is_in_range<R: Real>(status: &[AtomicU32], quanta: R, node: usize) -> bool {
+pub(crate) fn is_in_range<R: Real>(status: &[AtomicU32], quanta: R, node: usize) -> bool {
     let fits = quanta.abs() < R::from_f64(MOST_QUANTA);
     if !fits {
         status[status::FLAGS].fetch_or(status::FORCE_RANGE, Ordering::Relaxed);

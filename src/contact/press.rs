@@ -1,20 +1,14 @@
 //! Forces of faces on points as integers: the forces on the corners of a face and on the nodes that carry a point cancel exactly.
 
 use super::is_in_range;
-use super::joint::Joint;
+use super::joint::{Joint, quanta};
 use super::look::{Seen, View};
 use super::penalty::{Step, Walk};
 use super::potential::{Pushed, out};
 use super::rub::Rubbed;
 use super::sums::{add_virial, virial};
 use crate::kernel::lane::Real;
-use crate::kernel::vector::{Vector, add, fma, scale};
-
-/// A vector in quanta.
-#[inline(always)]
-fn quanta<R: Real>(v: Vector<R>) -> [i32; 3] {
-    [v[0].to_i32(), v[1].to_i32(), v[2].to_i32()]
-}
+use crate::kernel::vector::{add, fma, scale};
 
 impl<R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'_, R, FRICTION, PERIODIC> {
     /// Adds the forces of a face on a point to its corners, with its share of damping and friction, and their opposite to the
@@ -89,16 +83,6 @@ impl<R: Real, const FRICTION: bool, const PERIODIC: bool> Step<'_, R, FRICTION, 
     /// Distributes the force on a point to its nodes.
     #[inline(always)]
     pub(super) fn share_out<const N: usize>(&self, walk: &Walk<R, N>, own: [i32; 3], carriers: &mut Joint<N>) {
-        let joint = carriers.of(walk.nodes, self.forces, self.stiffness);
-        let mut rest = own;
-        let all: Vector<R> = [R::from_i32(own[0]), R::from_i32(own[1]), R::from_i32(own[2])];
-        for a in 0..N - 1 {
-            let part = quanta(scale(all, walk.weights[a]));
-            for k in 0..3 {
-                rest[k] = rest[k].wrapping_sub(part[k]);
-            }
-            joint.push(a, part);
-        }
-        joint.push(N - 1, rest);
+        carriers.of(walk.nodes, self.forces, self.stiffness).share(own, &walk.weights);
     }
 }

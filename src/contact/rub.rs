@@ -26,7 +26,7 @@ pub(super) struct Rubbed<R> {
 /// Viscosity, N·s/mm, for a given share of critical damping of a spring of `penalty` (N/mm) between masses of joint inverse
 /// `inverse` (1/tonne).
 #[inline(always)]
-fn viscosity<R: Real>(params: &Params, penalty: R, inverse: R) -> R {
+pub(crate) fn viscosity<R: Real>(params: &Params, penalty: R, inverse: R) -> R {
     R::from_f64(f64::from(params.damping)) * R::from_f64(2.0) * (penalty / inverse).sqrt()
 }
 

@@ -27,8 +27,9 @@ pub struct Row<R> {
     pub damping_solid: R,
     /// Damping rate of threads, 1/s.
     pub damping_thread: R,
-    /// Acceleration of the amplitude of prescribed motion, 1/s².
+    /// Rate of the amplitude of prescribed motion, 1/s, and the amplitude.
     pub motion: R,
+    pub amplitude: R,
     /// Upper bound of the speed at which the macroscopic deformation brings two near bodies together, mm/s.
     pub affine: R,
     /// Share of the motion that closes gaps: one, or zero while displacements are tried about a state.
@@ -55,6 +56,7 @@ impl Row<f64> {
             damping_solid: r(self.damping_solid),
             damping_thread: r(self.damping_thread),
             motion: r(self.motion),
+            amplitude: r(self.amplitude),
             affine: r(self.affine),
             closing: r(self.closing),
             searched: r(self.searched),

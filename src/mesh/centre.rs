@@ -31,6 +31,7 @@ pub fn centred(mesh: &Mesh) -> Cow<'_, Mesh> {
     }
     let mut moved = mesh.clone();
     moved.nodes.iter_mut().for_each(|x| *x = add(*x, shift));
+    moved.tools.iter_mut().for_each(|tool| tool.at_mm = add(tool.at_mm, shift));
     Cow::Owned(moved)
 }
 

@@ -3,6 +3,7 @@
 
 use crate::settings::friction::Friction;
 use crate::settings::material::Material;
+use crate::settings::tool::Tool;
 
 pub mod centre;
 pub mod clearance;
@@ -11,6 +12,7 @@ pub mod frame;
 pub mod linking;
 pub mod quality;
 pub mod report;
+pub mod solid;
 #[cfg(test)]
 pub(crate) mod sample;
 pub mod surface;
@@ -39,8 +41,10 @@ pub struct Mesh {
     pub blocks: Vec<Block>,
     /// Threads.
     pub threads: Vec<Thread>,
-    /// Coulomb friction coefficient of every contact.
+    /// Coulomb friction coefficient of every contact between yarns and threads.
     pub friction: Friction,
+    /// Rigid tools.
+    pub tools: Vec<Tool>,
 }
 
 /// Which ply a yarn belongs to.

@@ -8,9 +8,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Files and folders that a run writes; pictures (`*.png`) and meshes (`*.vtu`, `*.inp`) are additional.
-const OWN: [&str; 21] = [
+const OWN: [&str; 22] = [
     "run.log",
     "reactions.csv",
+    "tools.csv",
     "probes.csv",
     "contacts.csv",
     "yarns_each.csv",

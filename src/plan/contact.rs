@@ -4,6 +4,7 @@ use super::beams::Beams;
 use super::builder::Builder;
 use super::nodes::Nodes;
 use super::surfaces::{Carried, Surfaces};
+use super::tools::Tools;
 use super::{Active, Capacity, ContactPoint, Tables};
 use crate::contact::skin::Shares;
 use crate::contact::{
@@ -53,6 +54,7 @@ pub(super) struct ContactParts {
     pub pairs: Option<PairBuffers>,
     /// Energies of ties, and the number of ties.
     pub ties: Option<(Buffer, usize)>,
+    pub tools: Option<Tools>,
     pub points: [Vec<ContactPoint>; 2],
 }
 
@@ -110,6 +112,28 @@ const OF_YARNS: Names = Names {
     step: "yarn-yarn contact",
 };
 
+const NAMES: [&Names; 2] = [&OF_THREADS, &OF_YARNS];
+
+/// Contact points of threads or of yarns: see [`surface::CARRIED`] and [`surface::POINT`], and their number.
+#[derive(Clone, Copy)]
+pub(super) struct Points {
+    pub nodes: Buffer,
+    pub points: Buffer,
+    pub count: usize,
+}
+
+impl Points {
+    /// Adds the tables of the points, if there are any.
+    fn add(b: &mut Builder, carried: &Carried, names: &Names) -> Option<Self> {
+        let count = carried.contact_points.len();
+        (count > 0).then(|| Self {
+            nodes: b.indices(names.nodes, carried.nodes.clone()),
+            points: b.table(names.points, carried.points.clone()),
+            count,
+        })
+    }
+}
+
 /// The grid of the broad phase, where nearby bodies are found.
 struct Search {
     counts: Buffer,
@@ -141,9 +165,9 @@ impl Faces {
 
 /// Sums of contact forces and stiffness.
 #[derive(Clone, Copy)]
-struct Added {
-    force: Buffer,
-    stiffness: Buffer,
+pub(super) struct Added {
+    pub force: Buffer,
+    pub stiffness: Buffer,
 }
 
 /// Tables of the previous and next beams, see [`crate::contact::arc_offset`].
@@ -164,6 +188,7 @@ impl ContactScene<'_> {
             force: b.add("contact force", Kind::Int, 3 * self.nodes.count, false, Initial::Zero),
             stiffness: b.add("contact stiffness", Kind::Int, self.nodes.count, false, Initial::Zero),
         };
+        let points = [0, 1].map(|kind| Points::add(b, &surfaces.carried[kind], NAMES[kind]));
         let (mut faces, mut pairs) = ([None; 2], None);
         if active.searches() {
             let paired = if active.thread_thread { self.beams.count } else { 0 };
@@ -177,18 +202,20 @@ impl ContactScene<'_> {
                 self.beams_to_grid(b, &search, slabs, offsets, params);
             }
             let mut waits = true;
-            for (kind, carried) in surfaces.carried.iter().enumerate().filter(|(_, carried)| !carried.points.is_empty())
-            {
-                faces[kind] =
-                    tables.map(|tables| self.faces(b, &search, tables, (kind == 0, carried), sums, (params, waits)));
+            let meets = [active.thread_yarn, active.yarn_yarn];
+            for (kind, carried) in surfaces.carried.iter().enumerate().filter(|(kind, _)| meets[*kind]) {
+                let Some(points) = points[kind] else { continue };
+                faces[kind] = tables
+                    .map(|tables| self.faces(b, &search, tables, (kind == 0, carried, points), sums, (params, waits)));
                 waits = false;
             }
             pairs = offsets.map(|offsets| self.pairs(b, &search, offsets, sums, params));
         }
         let ties = active.ties.then(|| self.tied(b, sums, params));
+        let tools = if active.tools { Some(self.tools(b, points, sums, params)?) } else { None };
         let points = surfaces.carried.map(|carried| carried.contact_points);
         let Added { force, stiffness } = sums;
-        Ok(ContactParts { params, force, stiffness, faces, pairs, ties, points })
+        Ok(ContactParts { params, force, stiffness, faces, pairs, ties, tools, points })
     }
 
     /// Current and reference positions of nodes.
@@ -243,17 +270,16 @@ impl ContactScene<'_> {
         b: &mut Builder,
         search: &Search,
         tables: Faces,
-        (thread, carried): (bool, &Carried),
+        (thread, carried, points): (bool, &Carried, Points),
         total: Added,
         (params, waits): (Params, bool),
     ) -> FaceBuffers {
         let Active { friction, periodic, .. } = self.tables.active;
         let Capacity { faces, slots, .. } = self.capacity;
-        let (count, lists) = (carried.contact_points.len(), carried.carriers.len() / candidates::CARRIER);
-        let names = if thread { &OF_THREADS } else { &OF_YARNS };
+        let Points { nodes, points, count } = points;
+        let lists = carried.carriers.len() / candidates::CARRIER;
+        let names = NAMES[usize::from(!thread)];
         let carriers = b.indices(names.carriers, carried.carriers.clone());
-        let nodes = b.indices(names.nodes, carried.nodes.clone());
-        let points = b.table(names.points, carried.points.clone());
         let (list, row) = (candidates::MADE + faces, memory::GAPS + faces);
         let (places, size) = (candidates::MADE + slots, memory::touch(friction));
         let each = sums::sums(friction, periodic);

@@ -5,6 +5,7 @@ use crate::dynamics::integrate::Works;
 use crate::mesh::Mesh;
 use crate::scene::Scene;
 use crate::settings::steps::Step;
+use crate::settings::tool::Tool;
 
 /// The effects of a plan. An inactive effect adds no buffer, no stage and no shader text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,6 +25,8 @@ pub struct Active {
     pub contact_mass: bool,
     /// Cut threads are tied to yarns.
     pub ties: bool,
+    /// Rigid tools press on yarns and threads.
+    pub tools: bool,
 }
 
 impl Active {
@@ -37,12 +40,15 @@ impl Active {
         let thread_thread = contact.is_some_and(|c| c.thread_thread && beams_can_meet(mesh));
         let touches = thread_yarn || yarn_yarn || thread_thread;
         let ties = contact.is_some() && !scene.ties.is_empty();
+        let tools = contact.is_some() && !mesh.tools.is_empty();
+        let rubs = |tool: &Tool| tool.friction.kinds().yarn.max(tool.friction.kinds().thread) > 0.0;
+        let rubs = touches && mesh.friction.largest() > 0.0 || mesh.tools.iter().any(rubs);
         let tightens = scene.steps.iter().any(|step| matches!(step, Step::Pretension { .. }));
         Self {
             thread_yarn,
             yarn_yarn,
             thread_thread,
-            friction: touches && mesh.friction.largest() > 0.0 && contact.is_some_and(|c| c.friction),
+            friction: rubs && contact.is_some_and(|c| c.friction),
             bending: effects.bending && mesh.threads.iter().any(|t| t.bending > 0.0 && t.beams() > 1),
             thermal: tightens && mesh.threads.iter().any(|t| t.thermal_strain != 0.0),
             gravity: effects.gravity_mm_s2.is_some_and(|g| g != [0.0; 3]),
@@ -51,9 +57,10 @@ impl Active {
             }),
             periodic: mesh.period.is_some(),
             fibre_lines: lines.iter().any(Line::has_fibres),
-            contact_mass: (touches || ties)
+            contact_mass: (touches || ties || tools)
                 && effects.contact_mass.as_ref().is_some_and(|mass| mass.factor > 0.0 || mass.least_limit_s > 0.0),
             ties,
+            tools,
         }
     }
 

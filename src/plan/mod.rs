@@ -22,6 +22,7 @@ mod shapes;
 mod solids;
 mod surfaces;
 mod threads;
+mod tools;
 mod totals;
 
 use crate::dynamics::fibre_lines::Line;
@@ -46,6 +47,8 @@ use nodes::{Nodes, Searched};
 use solids::Solids;
 use std::borrow::Cow;
 use threads::Threads;
+use tools::Tools;
+pub use tools::ToolBuffers;
 pub use totals::{Largest, Sums, Totals};
 
 /// The plan of a scene.
@@ -62,7 +65,7 @@ pub fn build(scene: &Scene, capacity: Capacity) -> Result<Model> {
     let bends = Bends::add(b, t, &nodes, &beams);
     let searched = Searched::add(b, t, &nodes);
     let before = searched.as_ref().map(|searched| searched.everything);
-    let touches = scene.effects.contact.as_ref().filter(|_| t.active.searches() || t.active.ties);
+    let touches = scene.effects.contact.as_ref().filter(|_| t.active.searches() || t.active.ties || t.active.tools);
     let contact = touches.map(|chosen| {
         let scene = ContactScene { chosen, tables: t, capacity, nodes: &nodes, beams: &beams, before };
         scene.add(b)
@@ -79,6 +82,9 @@ pub fn build(scene: &Scene, capacity: Capacity) -> Result<Model> {
     let held = Held::add(b, t, &nodes, &units);
     let correction = dynamics::fibre_lines(b, t, &nodes, held.as_ref(), &units);
     dynamics::integrate(b, t, &nodes, assembled.added_mass, correction, &units);
+    if let Some(tools) = contact.as_ref().and_then(|contact| contact.tools.as_ref()) {
+        tools.march(b, t);
+    }
 
     let elements = (&mut hexes, &beams, bends.as_ref());
     let weighed_limit = limits::add(b, t, &nodes, elements, &assembled, held.as_ref());
@@ -163,6 +169,11 @@ impl Parts<'_> {
     /// Buffers of contact between beams.
     fn pairs(&self) -> Option<PairBuffers> {
         self.contact.as_ref().and_then(|contact| contact.pairs)
+    }
+
+    /// Rigid tools.
+    fn tools(&self) -> Option<&Tools> {
+        self.contact.as_ref().and_then(|contact| contact.tools.as_ref())
     }
 
     /// Number of contact points of threads and of yarns.

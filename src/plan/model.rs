@@ -2,7 +2,7 @@
 
 use super::contact::FaceBuffers;
 use super::totals::Totals;
-use super::{Active, Parts};
+use super::{Active, Parts, ToolBuffers};
 use crate::contact::{memory, slot_state};
 use crate::elements::LANES;
 use crate::kernel::buffer::Buffer;
@@ -90,6 +90,7 @@ pub struct Buffers {
     /// Mask of the prescribed components of each node, if fibre lines need it.
     pub partly: Option<Buffer>,
     pub reaction: Option<Buffer>,
+    pub tools: Option<ToolBuffers>,
     /// Slip of each contact point of threads and of yarns since the start, mm.
     pub slip: [Option<Buffer>; 2],
 }
@@ -120,8 +121,10 @@ impl Model {
     pub(super) fn new(plan: Plan, p: Parts, forces: usize, totals: Totals, slip: [Option<Buffer>; 2]) -> Self {
         let Parts { tables, nodes, .. } = &p;
         let sees_motion = |stage: &&Stage| {
-            let taken = |buffer| Some(buffer) == nodes.work || Some(buffer) == p.held.as_ref().map(|held| held.work);
-            stage.reads.contains(&nodes.velocity) || stage.writes.iter().any(|(buffer, _)| taken(*buffer))
+            let works = [nodes.work, p.held.as_ref().map(|held| held.work), p.tools().map(|tools| tools.buffers.works)];
+            let taken = |buffer| works.contains(&Some(buffer));
+            let of_tools = |buffer: &Buffer| works[2] == Some(*buffer);
+            stage.reads.iter().any(of_tools) || stage.reads.contains(&nodes.velocity) || stage.writes.iter().any(|(buffer, _)| taken(*buffer))
         };
         let collect_motion = plan.collect.iter().filter(sees_motion).cloned().collect();
         let mut hex_at = vec![0; tables.solids.headers.len() * LANES];
@@ -183,6 +186,7 @@ impl Buffers {
             prescribed: held.as_ref().map(|held| held.nodes),
             partly: held.as_ref().and_then(|held| held.partly),
             reaction: held.as_ref().map(|held| held.reaction),
+            tools: p.tools().map(|tools| tools.buffers),
             slip,
         }
     }

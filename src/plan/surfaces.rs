@@ -41,10 +41,8 @@ impl Surfaces {
     /// More nodes or faces than the tables can number.
     pub fn new(mesh: &Mesh, threads: &Threads, contact: &Contact, active: Active) -> Result<Self> {
         let mut t = Self::default();
-        if !active.thread_yarn && !active.yarn_yarn {
-            return Ok(t);
-        }
-        for (number, block) in mesh.blocks.iter().enumerate() {
+        let meets_faces = active.thread_yarn || active.yarn_yarn;
+        for (number, block) in mesh.blocks.iter().enumerate().filter(|_| meets_faces) {
             let surface = Surface::new(block);
             let wraps = block.wrap.unwrap_or_default().map(|along| along != 0);
             let (faces, first) = (surface.closed(), t.faces.len() / FACE);
@@ -67,10 +65,10 @@ impl Surfaces {
             let message = format!("{counts} are more than contact can number ({MOST_FACES} and {MOST_NODES})");
             return Err(Error::geometry("effects.contact", message));
         }
-        if active.thread_yarn {
+        if active.thread_yarn || active.tools {
             t.carried[0] = of_threads(mesh, threads, contact);
         }
-        if active.yarn_yarn {
+        if active.yarn_yarn || active.tools {
             t.carried[1] = of_yarns(mesh, contact);
         }
         Ok(t)

@@ -14,6 +14,7 @@ use crate::elements::hex8_reduced::HOURGLASS;
 use crate::kernel::buffer::Buffer;
 use crate::kernel::position::quanta;
 use crate::kernel::stage::{Code, Stage, flagged, wires};
+use crate::tools::motion;
 use std::ops::Range;
 
 /// Places of the column sums in the totals, part by part.
@@ -58,6 +59,8 @@ pub struct Totals {
     pub works: Works,
     pub thermal: Option<Sums>,
     pub reaction: Option<Sums>,
+    /// Works on tools and their kinetic energy: columns as in [`crate::tools::motion`].
+    pub tools: Option<Sums>,
     /// Virial stress of hexahedra, beams and bends: nine components each.
     pub stress: Vec<Sums>,
     /// Sums of points and of pairs of beams: columns as in [`crate::contact::sums`].
@@ -238,6 +241,10 @@ pub(super) fn add(b: &mut Builder, p: &Parts) -> (Totals, [Option<Buffer>; 2]) {
     if let Some(pairs) = p.pairs() {
         contact.push(c.taken(pairs.sums, Columns::rows(beams.count, sums::sums(friction, periodic)), false));
     }
+    let tools = p.tools().map(|tools| tools.buffers);
+    for (sums, count) in tools.iter().flat_map(|tools| tools.sums).flatten() {
+        contact.push(c.taken(sums, Columns::rows(count, sums::sums(friction, periodic)), contact.is_empty()));
+    }
     let mut stress = Vec::new();
     if let Some(virial) = hexes.virial {
         stress.push(c.taken(virial, Columns::blocks(hex_blocks, VIRIAL, 9), false));
@@ -259,6 +266,7 @@ pub(super) fn add(b: &mut Builder, p: &Parts) -> (Totals, [Option<Buffer>; 2]) {
         works,
         thermal: beams.work.map(|work| c.taken(work, Columns::range(0..beams.count), false)),
         reaction: held.map(|held| c.taken(held.work, Columns::range(0..held.count), false)),
+        tools: tools.map(|tools| c.taken(tools.works, Columns::rows(tables.mesh.tools.len(), motion::WORKS), false)),
         stress,
         contact,
         ties: ties.map(|(energy, count)| c.kept(energy, Columns::range(0..count))),

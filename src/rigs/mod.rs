@@ -13,6 +13,7 @@ pub mod inline;
 pub mod observer;
 pub mod read;
 mod thread_tension;
+mod tools;
 mod yarn_compaction;
 mod yarn_shear;
 
@@ -114,6 +115,7 @@ pub fn of_mut(domain: &mut Domain) -> &mut dyn Rig {
 pub fn scene(case: &Case) -> Result<Scene> {
     let Piece { mesh, motions, ties } = of(&case.domain).piece(case)?;
     let shift = centre::shift(&mesh);
+    tools::near(&mesh)?;
     for (node, position) in mesh.nodes.iter().enumerate() {
         if add(*position, shift).iter().any(|x| x.abs() > REACH) {
             let message = format!(

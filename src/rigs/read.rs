@@ -1,5 +1,6 @@
 //! Reads a case file and command-line overrides into a typed case with every number checked.
 
+use super::tools;
 use crate::case::accuracy::{Accuracy, fill};
 use crate::case::overrides::Override;
 use crate::case::provenance::Provenance;
@@ -41,6 +42,7 @@ fn overridden(mut value: Value, mut provenance: Provenance, overrides: &[String]
         provenance.overrides.push(set);
     }
     inline_fabric(&mut value, &mut provenance)?;
+    tools::inline(&mut value, &provenance)?;
     checked(value, provenance, &schema)
 }
 

@@ -31,6 +31,15 @@ impl Effect {
     }
 }
 
+/// Stages of rigid tools.
+const TOOLS: &[&str] = &[
+    "tools on threads",
+    "tools on yarns",
+    "forces of threads on tools",
+    "forces of yarns on tools",
+    "motion of tools",
+];
+
 /// Changes contact, if there is any.
 fn contact(loaded: &mut Loaded, change: impl Fn(&mut Contact)) {
     if let Some(contact) = &mut loaded.case.effects.contact {
@@ -113,14 +122,21 @@ impl Found<'_> {
             self.add(name, cause, stages, Some(off));
         }
         if active.friction {
-            let coefficient = self.simulation.mesh().friction;
-            let cause =
-                format!("{} and a coefficient of friction of {coefficient}", self.written("effects.contact.friction"));
+            let (mesh, written) = (self.simulation.mesh(), self.written("effects.contact.friction"));
+            let cause = if mesh.friction.largest() > 0.0 {
+                format!("{written} and a coefficient of friction of {}", mesh.friction)
+            } else {
+                format!("{written} and a tool with a coefficient of friction")
+            };
             self.add("friction", cause, &[], Some(|l| contact(l, |c| c.friction = false)));
         }
-        if active.searches() && settings.is_some_and(|c| c.damping_ratio > 0.0) {
+        if (active.searches() || active.tools) && settings.is_some_and(|c| c.damping_ratio > 0.0) {
             let cause = self.written("effects.contact.damping_ratio");
             self.add("contact damping", cause, &[], Some(|l| contact(l, |c| c.damping_ratio = 0.0)));
+        }
+        if active.tools {
+            let names: Vec<&str> = self.simulation.mesh().tools.iter().map(|tool| tool.name.as_str()).collect();
+            self.add("tools", format!("the rigid tools {}", names.join(", ")), TOOLS, None);
         }
         if active.ties {
             let count = self.simulation.scene.ties.len();

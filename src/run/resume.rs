@@ -138,7 +138,7 @@ impl Run<'_> {
     /// Files of the tables, always in the same order.
     fn tables(&mut self) -> Vec<&mut Appended> {
         let tables = [&mut self.history.file, &mut self.energies.file, &mut self.contacts.file];
-        let grips = self.grips.iter_mut().map(|grips| &mut grips.table.file);
+        let grips = self.grips.iter_mut().flat_map(|grips| grips.tables());
         let probes = self.probes.iter_mut().map(|probes| &mut probes.table.file);
         let yarns = self.yarns.iter_mut().flat_map(|(plies, each)| [&mut plies.file, &mut each.file]);
         tables

@@ -6,3 +6,4 @@ pub mod friction;
 pub mod integration;
 pub mod material;
 pub mod steps;
+pub mod tool;

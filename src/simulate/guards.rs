@@ -76,10 +76,11 @@ impl Simulation {
         let h = &self.health;
         let allowed = self.scene.integration.penetration_tolerance;
         let l = &self.model.limits;
+        let more = if self.model.active.tools { " or a tool" } else { "" };
         let kinds = [
-            ("a thread into a yarn", l.thread_radius),
-            ("a yarn into a yarn", l.yarn_thickness),
-            ("a thread into a thread", l.thread_radius),
+            (format!("a thread into a yarn{more}"), l.thread_radius),
+            (format!("a yarn into a yarn{more}"), l.yarn_thickness),
+            ("a thread into a thread".into(), l.thread_radius),
         ];
         for (kind, ((what, size), depth)) in kinds.into_iter().zip(h.penetration).enumerate() {
             if depth > allowed * size && self.schedule.load(self.time).radius >= 1.0 {

@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::kernel::stage::{Order, Stage};
 use crate::measure::shear::trellis;
 use crate::plan::Sums;
+use crate::tools::motion;
 
 /// Energies now, and work done since the start, in mJ (N·mm).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -101,7 +102,8 @@ impl Simulation {
         self.backend.run(&stages, &[row]);
         let taken = |stage: &&Stage| {
             let faces = b.faces.iter().flatten().map(|faces| faces.sums);
-            let sums = |buffer| faces.clone().chain(b.pair_sums).any(|sums| sums == buffer);
+            let of_tools = b.tools.iter().flat_map(|tools| tools.sums).flatten().map(|(sums, _)| sums);
+            let sums = |buffer| faces.clone().chain(of_tools.clone()).chain(b.pair_sums).any(|sums| sums == buffer);
             stage.writes.iter().any(|(buffer, _)| sums(*buffer))
         };
         let stages: Vec<Stage> = self.model.plan.collect.iter().filter(taken).cloned().collect();
@@ -137,7 +139,13 @@ impl Simulation {
                 _ => 0.0,
             };
             let [damping, inertia, gravity] = places.works.planes().map(done);
-            [damping, inertia, gravity, only(places.reaction, totals)]
+            let of_tools = |column| places.tools.map_or(0.0, |sums| sums.of(totals, column));
+            [
+                damping + of_tools(motion::DAMPED),
+                inertia + of_tools(motion::INERTIA),
+                gravity + of_tools(motion::GRAVITY),
+                only(places.reaction, totals) + of_tools(motion::LOADED),
+            ]
         };
         let (before, last) = (motion(totals), motion(after));
         let e = &mut self.energies;
@@ -209,7 +217,8 @@ impl Simulation {
         let only = |sums: Option<Sums>| sums.map_or(0.0, |sums| sums.of(totals, 0));
         let modes = [0, 1, 2, 3].map(|mode| places.modes.map_or(0.0, |sums| sums.of(totals, mode)));
         let mean = |sums: Sums| 0.5 * (sums.of(totals, 0) + sums.of(after, 0));
-        let kinetic = mean(places.kinetic);
+        let of_tools = places.tools.map_or(0.0, |sums| sums.of(after, motion::KINETIC));
+        let kinetic = mean(places.kinetic) + of_tools;
         self.energies = Energies {
             elongation: modes[0],
             compaction: modes[1],

@@ -18,12 +18,14 @@ mod search;
 mod snapshot;
 mod state;
 mod stretch;
+mod tools;
 
 pub use backend_config::BackendConfig;
 pub use ledger::Energies;
 pub use limit::Limit;
 pub use retry::Retries;
 pub use stretch::Fibres;
+pub use tools::ToolState;
 
 use crate::backend::Backend;
 use crate::error::{Error, Result};

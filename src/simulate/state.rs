@@ -13,8 +13,9 @@ impl Simulation {
     /// Brings to the host what rows of tables are measured from, with one wait for a device.
     pub fn bring_row(&mut self) {
         let b = &self.model.buffers;
-        let all = [Some(b.quanta), Some(b.remainder), b.beam_tension, b.reaction];
-        self.backend.bring(&all.into_iter().flatten().collect::<Vec<_>>());
+        let tools = b.tools.map(|tools| [tools.seats, tools.motions, tools.results]);
+        let all = [Some(b.quanta), Some(b.remainder), b.beam_tension, b.reaction].into_iter().flatten();
+        self.backend.bring(&all.chain(tools.into_iter().flatten()).collect::<Vec<_>>());
     }
 
     /// Brings to the host what a [`frame`](Self::frame) consists of, with one wait for a device.

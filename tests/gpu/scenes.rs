@@ -35,3 +35,22 @@ pub(super) fn free() -> Value {
         ],
     )
 }
+
+/// The same scene with tools of every shape, which press on its yarns and its thread.
+pub(super) fn tools() -> Value {
+    let corner = |i: usize| [0, 1, 2].map(|k| 0.3 * (f64::from(u8::from(i >> k & 1 == 1)) - 0.5) * 2.0);
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles: Vec<_> =
+        faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]].map(|face| face.map(corner))).collect();
+    let tools = json!([
+        { "name": "plate", "shape": "plane", "at_mm": [0, 0, 0.005], "displacement_mm": [0.05, 0, 0.01], "friction": 0.3 },
+        { "name": "ball", "shape": { "sphere": { "radius_mm": 0.5 } }, "at_mm": [2, 0.65, 2.16], "displacement_mm": [0.02, 0, -0.05],
+          "friction": { "yarn": 0.1, "thread": 0.4 } },
+        { "name": "cube", "shape": { "mesh": { "triangles_mm": triangles, "cell_mm": 0.07 } }, "at_mm": [1, 0.5, 1.985],
+          "turned_deg": [5, 3, 20] },
+        { "name": "box", "shape": { "box": { "size_mm": [0.8, 0.62, 0.7], "edge_radius_mm": 0.1 } },
+          "at_mm": [1.5, 1.3, 1.25], "friction": 0.2,
+          "free": { "axes": [false, true, true], "mass_g": 1e-3, "force_n": [0, -0.1, 0] } }
+    ]);
+    with(free(), &[("/domain/mesh/tools", tools)])
+}

@@ -1,6 +1,7 @@
 //! The WGSL twins of all stages: each is there, compiles by itself, and sees the buffers, the row and the parameters of its stage
 //! with the layout that Rust gives them, as naga parses it.
 
+use super::scenes;
 use crate::common::{bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, reduced, with};
 use naga::{AddressSpace, ScalarKind, StorageAccess, TypeInner};
 use serde_json::{Value, json};
@@ -14,7 +15,7 @@ use tricot::kernel::shader::{ENTRY, Text};
 use tricot::kernel::stage::Stage;
 use tricot::run::simulation;
 use tricot::simulate::BackendConfig;
-use tricot::{conditions, contact, dynamics, elements};
+use tricot::{conditions, contact, dynamics, elements, tools};
 
 /// Scenes that together have every effect, and each effect missing once.
 pub(super) fn scenes() -> Vec<(&'static str, Value)> {
@@ -53,6 +54,7 @@ pub(super) fn scenes() -> Vec<(&'static str, Value)> {
         ],
     );
     vec![
+        ("tools", scenes::tools()),
         ("cell", cell),
         ("cell without contact mass", without_mass),
         ("specimen", specimen),
@@ -100,11 +102,12 @@ fn parameters(file: &str) -> Vec<Field<&'static str>> {
     match file {
         "elements/hex8" | "elements/hex8_reduced" => fields!(elements::block::Params: nodes, left),
         "contact/grid" | "contact/candidates" | "contact/penalty" | "contact/pairs" | "contact/threads"
-        | "contact/tie" => fields!(
+        | "contact/tie" | "tools/touch" => fields!(
             contact::Params: period, cells, capacity, faces, slots, beam_slots, slabs, state, origin, cell, skin, friction, tangential, damping,
             force_quantum, stiffness_quantum, thread_radius, thread_thread, self_arc, depth, apart
         ),
         "conditions/prescribed" => fields!(conditions::prescribed::Params: first_thread),
+        "tools/motion" => fields!(tools::motion::Params: gravity, mass_factor),
         "dynamics/assemble" => fields!(
             dynamics::assemble::Params: first_thread, force_quantum, stiffness_quantum, mass_factor, mass_memory,
             mass_per_stiffness, gravity
@@ -192,7 +195,7 @@ fn check(name: &str, stage: &Stage, buffers: &[Description]) {
         let names: Vec<Field<&str>> = members.iter().map(|(n, o, s)| (n.as_str(), *o, *s)).collect();
         let row = fields!(
             Row<f32>: gradient, rate, dt, dt_mid, thermal, thermal_increment, radius, radius_increment, damping_solid,
-            damping_thread, motion, affine, closing, searched, turn
+            damping_thread, motion, amplitude, affine, closing, searched, turn
         );
         assert_eq!(names, row, "{name}: row");
     }
@@ -219,6 +222,6 @@ fn every_twin_compiles_and_sees_what_its_stage_binds() {
     }
     let unused: Vec<_> = unused.difference(&used).collect();
     assert!(unused.is_empty(), "no twin uses {unused:?}");
-    assert!(seen.len() == 30, "{} kinds of stages", seen.len());
+    assert!(seen.len() == 32, "{} kinds of stages", seen.len());
     assert_eq!(failed, 0, "stages without a twin that fits; see above");
 }

@@ -2,7 +2,7 @@
 //! scalars are compared relative to their column. Without an adapter the tests say so and pass, unless TRICOT_REQUIRE_ADAPTER is
 //! set.
 
-use super::scenes::free;
+use super::scenes::{free, tools};
 use crate::common::{Random, advance, coarse_cell, held_specimen, loaded, reduced};
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock, OnceLock};
@@ -82,6 +82,8 @@ enum Exception {
     Lists,
     /// Whole quanta of displacements, compared together with the remainder: either may hold a quantum.
     Whole,
+    /// Displacements and velocities of tools: of the former either the whole part or the rest may hold a quantum.
+    Tools,
     /// Boxes, whose last numbers are motion in whole quanta: rounding decides between two equally near quanta.
     Boxes,
     /// The remainder: the change of both together is compared.
@@ -100,12 +102,14 @@ fn exception(model: &Model, buffer: Buffer) -> Option<Exception> {
         "touches of thread points" | "touches of yarn points" => Exception::Repeats(model.touch),
         "beam pair state" => Exception::Slots(model.slot_state),
         "line correction" => Exception::Planes(3),
-        "totals" => Exception::Single,
+        "totals" | "parts of forces on tools" => Exception::Single,
         "contact force" => Exception::Rounded(3),
         "contact stiffness" => Exception::Rounded(1),
         "cells" => Exception::Lists,
         "displacement quanta" => Exception::Whole,
         "boxes" => Exception::Boxes,
+        "motion of tools" => Exception::Tools,
+        "places of tools" => Exception::Rounded(1),
         "displacement remainder" => Exception::Remainder,
         "status" => Exception::Status,
         _ => return None,
@@ -150,7 +154,11 @@ fn rules(model: &Model, stage: &Stage, buffer: Buffer, access: Access) -> Vec<Ru
     let rule = |number: usize| {
         let (plane, place) = (number / (len / planes), number % (len / planes));
         let column = plane * stride + place % stride / lanes % slots;
-        let quanta = if exception == Some(Exception::Boxes) && column >= grid::MOTION { 1.0 } else { 0.0 };
+        let quanta = match exception {
+            Some(Exception::Boxes) if column >= grid::MOTION => 1.0,
+            Some(Exception::Tools) if column < 3 => 1.01 * QUANTUM,
+            _ => 0.0,
+        };
         // numbers of no item of the stage stay as they are
         if items.contains(&(place / stride)) { Column(column, quanta) } else { Equal }
     };
@@ -368,6 +376,7 @@ fn every_stage_agrees_with_the_cpu_on_every_buffer() {
         (free(), 1e-4),
         (reduced(coarse_cell()), 1.2e-4),
         (reduced(free()), 1e-4),
+        (tools(), 1e-4),
     ];
     for (case, end) in cases {
         let mut simulation = run::simulation(&loaded(&case), config()).unwrap();

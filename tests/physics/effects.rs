@@ -152,6 +152,12 @@ fn a_scene_without_an_effect_has_no_trace_of_it() {
             &contact(json!({ "friction": false })),
         ),
         absent(
+            "tools",
+            &["tool", "seats", "notes"],
+            &with(free.clone(), &[("/domain/mesh/tools", json!([{ "name": "plate", "shape": "plane" }]))]),
+            &[("/domain/mesh/tools", json!([]))],
+        ),
+        absent(
             "friction by its coefficient",
             &["slide", "slip", "SUM_FRICTION"],
             &cell,

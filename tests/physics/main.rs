@@ -25,4 +25,5 @@ mod segments;
 mod specimen;
 mod stretch;
 mod time_step;
+mod tools;
 mod totals;

@@ -8,6 +8,7 @@ use crate::case::provenance::Provenance;
 use crate::case::suggest::advice;
 use crate::error::Result;
 use crate::rigs::check::{self, MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM};
+use crate::rigs::tools;
 use crate::settings::steps::Step;
 use glam::DVec3;
 
@@ -40,6 +41,7 @@ pub fn check(case: &Case, mesh: &InlineMesh, provenance: &Provenance) -> Result<
     for (i, condition) in mesh.conditions.iter().enumerate() {
         catches(mesh, condition, &format!("domain.mesh.conditions.{i}"), provenance)?;
     }
+    tools::check(case, &mesh.tools, "domain.mesh.tools", provenance)?;
     steps(case, mesh, provenance)
 }
 
@@ -193,7 +195,9 @@ fn steps(case: &Case, mesh: &InlineMesh, provenance: &Provenance) -> Result<()> 
     check::steps(case, provenance, |step| match step {
         Step::Shear { .. } => Some("shear needs a periodic cell: use domain.cell, or move with conditions"),
         Step::Stretch { .. } => Some("only a cell has a stretch of its own: use move, with conditions on nodes"),
-        Step::Move { .. } if mesh.conditions.is_empty() => Some("nothing to move: give domain.mesh.conditions"),
+        Step::Move { .. } if mesh.conditions.is_empty() && mesh.tools.is_empty() => {
+            Some("nothing to move: give domain.mesh.conditions or domain.mesh.tools")
+        }
         _ => None,
     })?;
     let moves = case.steps.iter().any(|step| matches!(step, Step::Move { .. }));
@@ -201,6 +205,7 @@ fn steps(case: &Case, mesh: &InlineMesh, provenance: &Provenance) -> Result<()> 
         let path = format!("domain.mesh.conditions.{i}.displacement_mm");
         return Err(provenance.error(&path, "is never applied: add a move step"));
     }
+    tools::applied(case, &mesh.tools, "domain.mesh.tools", provenance)?;
     let tightens = case.steps.iter().any(|step| matches!(step, Step::Pretension { .. }));
     if let Some(i) = mesh.threads.iter().position(|t| !tightens && t.thermal_strain != 0.0) {
         let path = format!("domain.mesh.threads.{i}.thermal_strain");

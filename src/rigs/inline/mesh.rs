@@ -8,7 +8,7 @@ use crate::mesh::{Block, Mesh, Part, Ply, Thread, quality};
 
 /// Builds the blocks and threads of an inline mesh.
 pub fn build(inline: &InlineMesh) -> Result<Mesh> {
-    let mut mesh = Mesh { friction: inline.friction, ..Mesh::default() };
+    let mut mesh = Mesh { friction: inline.friction, tools: inline.tools.clone(), ..Mesh::default() };
     require(!inline.blocks.is_empty() || !inline.threads.is_empty(), "domain.mesh", || {
         "holds neither blocks nor threads".into()
     })?;
