@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 pub enum Domain {
     /// A periodic cell of whole repeats: x spans `warps` warp pitches, y spans `wefts` weft pitches.
     Cell(Cell),
+    /// A periodic cell, compacted between plates.
+    CellCompaction(CellCompaction),
     /// A rectangle cut from the fabric at an angle and pulled: the bias-extension test.
     Specimen(Specimen),
     /// A piece of the stitching thread, pulled along its length (Fig. 10 of the paper).
@@ -52,6 +54,31 @@ pub struct Cell {
 impl Default for Cell {
     fn default() -> Self {
         Self { warps: 2, wefts: 4 }
+    }
+}
+
+/// A periodic cell between smooth plates, which come together in the `move` steps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct CellCompaction {
+    /// Number of warp yarns, at least 2. Default 2.
+    #[schemars(range(min = 2, max = 2000))]
+    pub warps: usize,
+    /// Number of weft yarns: even (a tricot repeats after two courses), at least 2. Default 4.
+    #[schemars(range(min = 2, max = 2000))]
+    pub wefts: usize,
+    /// Distance of the plates at the end of a `move` step to 1, mm. Default 0.6.
+    #[schemars(range(min = 0.001, max = 50))]
+    pub thickness_mm: f64,
+    /// Density of the fibres, g/cm³, for the fibre volume fraction. Default 1.8 (carbon).
+    #[schemars(range(min = 0.1, max = 20))]
+    pub fibre_density_g_cm3: f64,
+}
+
+impl Default for CellCompaction {
+    fn default() -> Self {
+        let Cell { warps, wefts } = Cell::default();
+        Self { warps, wefts, thickness_mm: 0.6, fibre_density_g_cm3: 1.8 }
     }
 }
 

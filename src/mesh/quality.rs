@@ -5,6 +5,8 @@ use super::{Block, CORNER_SIGNS, Mesh, Part, Ply, Thread};
 
 /// 1 g/m² in tonne/mm².
 pub const TONNES_PER_MM2: f64 = 1e-12;
+/// Tonnes per mm³ of a g/cm³.
+pub const TONNES_PER_MM3: f64 = 1e-9;
 /// 1 tex (g/km) in tonne/mm.
 pub const TONNES_PER_MM_OF_TEX: f64 = 1e-12;
 

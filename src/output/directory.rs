@@ -7,32 +7,10 @@ use crate::error::{Error, Result};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Files and folders that a run writes; pictures (`*.png`) and meshes (`*.vtu`, `*.inp`) are additional.
-const OWN: [&str; 22] = [
-    "run.log",
-    "reactions.csv",
-    "tools.csv",
-    "probes.csv",
-    "contacts.csv",
-    "yarns_each.csv",
-    "stress.csv",
-    "history.csv",
-    "energies.csv",
-    "yarns.csv",
-    "stitches.csv",
-    "summary.json",
-    "run.pvd",
-    "report.html",
-    "frames",
-    "state",
-    "pictures",
-    "shear.csv",
-    "crossings.csv",
-    "crossings.pvd",
-    "stages.csv",
-    "case.json",
-];
-const OWN_EXTENSIONS: [&str; 3] = ["png", "vtu", "inp"];
+/// Files and folders that a run writes; tables (`*.csv`), collections of frames (`*.pvd`), pictures (`*.png`) and meshes (`*.vtu`,
+/// `*.inp`) are additional.
+const OWN: [&str; 7] = ["run.log", "summary.json", "report.html", "frames", "state", "pictures", "case.json"];
+const OWN_EXTENSIONS: [&str; 5] = ["csv", "pvd", "png", "vtu", "inp"];
 
 /// The default results folder of a case: `results/<name of the case file>`.
 pub fn default(case: &Path) -> PathBuf {

@@ -6,6 +6,7 @@
 pub mod bias_extension;
 mod cantilever;
 pub mod cell;
+mod cell_compaction;
 mod check;
 mod constituents;
 mod crossings;
@@ -86,6 +87,7 @@ pub struct Piece {
 pub fn of(domain: &Domain) -> &dyn Rig {
     match domain {
         Domain::Cell(cell) => cell,
+        Domain::CellCompaction(compaction) => compaction,
         Domain::Specimen(specimen) => specimen,
         Domain::ThreadTension(tension) => tension,
         Domain::Cantilever(cantilever) => cantilever,
@@ -99,6 +101,7 @@ pub fn of(domain: &Domain) -> &dyn Rig {
 pub fn of_mut(domain: &mut Domain) -> &mut dyn Rig {
     match domain {
         Domain::Cell(cell) => cell,
+        Domain::CellCompaction(compaction) => compaction,
         Domain::Specimen(specimen) => specimen,
         Domain::ThreadTension(tension) => tension,
         Domain::Cantilever(cantilever) => cantilever,

@@ -5,30 +5,26 @@ use crate::case::domain::Cell;
 use crate::case::fabric::Fabric;
 use crate::case::provenance::Provenance;
 use crate::error::Result;
-use crate::rigs::check::{MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM, fabric, steps};
-use crate::settings::steps::Step;
+use crate::rigs::check::{MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM, fabric};
 
-pub fn check(case: &Case, &Cell { warps, wefts }: &Cell, provenance: &Provenance) -> Result<()> {
+/// Checks a cell whose numbers of yarns are given at a path of the case.
+pub fn check(case: &Case, &Cell { warps, wefts }: &Cell, path: &str, provenance: &Provenance) -> Result<()> {
     let fabric = fabric(case, "cell", provenance)?;
     if wefts % 2 == 1 {
         let message = format!("{wefts} is odd, a tricot repeats after two courses: give an even number");
-        return Err(provenance.error("domain.cell.wefts", message));
+        return Err(provenance.error(&format!("{path}.wefts"), message));
     }
-    steps(case, provenance, |step| match step {
-        Step::Move { .. } => Some("a cell has no conditions to move: use shear, or a domain.mesh with conditions"),
-        _ => None,
-    })?;
-    size(case, fabric, [warps, wefts], provenance)
+    size(case, fabric, [warps, wefts], path, provenance)
 }
 
-fn size(case: &Case, fabric: &Fabric, [warps, wefts]: [usize; 2], provenance: &Provenance) -> Result<()> {
+fn size(case: &Case, fabric: &Fabric, [warps, wefts]: [usize; 2], path: &str, provenance: &Provenance) -> Result<()> {
     let lengths = [warps as f64 * fabric.warp.pitch_mm, wefts as f64 * fabric.weft.pitch_mm];
     for (name, count, length) in [("warps", warps, lengths[0]), ("wefts", wefts, lengths[1])] {
         if length > MAX_POSITION_MM {
             let message = format!(
                 "{count} make a cell of {length} mm, at most {MAX_POSITION_MM} mm: use fewer, cells are periodic"
             );
-            return Err(provenance.error(&format!("domain.cell.{name}"), message));
+            return Err(provenance.error(&format!("{path}.{name}"), message));
         }
     }
     let resolution = &case.resolution.refined();

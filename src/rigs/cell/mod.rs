@@ -4,9 +4,13 @@ mod check;
 mod observer;
 mod page;
 
+pub(super) use check::check;
+pub(super) use observer::Sheared;
+pub(super) use page::curves;
 pub use page::tension;
 
 use super::observer::{Observer, Tables};
+use super::check::steps;
 use super::{Piece, Rig, crossings};
 use crate::case::Case;
 use crate::case::domain::Cell;
@@ -15,11 +19,16 @@ use crate::error::Result;
 use crate::fabric;
 use crate::output::page::Page;
 use crate::output::results::Results;
+use crate::settings::steps::Step;
 use crate::simulate::Simulation;
 
 impl Rig for Cell {
     fn check(&self, case: &Case, provenance: &Provenance) -> Result<()> {
-        check::check(case, self, provenance)
+        check(case, self, "domain.cell", provenance)?;
+        steps(case, provenance, |step| match step {
+            Step::Move { .. } => Some("a cell has no conditions to move: use shear, or a domain.mesh with conditions"),
+            _ => None,
+        })
     }
 
     fn piece(&self, case: &Case) -> Result<Piece> {
@@ -28,11 +37,11 @@ impl Rig for Cell {
     }
 
     fn observer(&self, case: &Case, simulation: &Simulation, tables: &Tables) -> Result<Box<dyn Observer>> {
-        Ok(Box::new(observer::Sheared::of(case.fabric()?, simulation, tables)?))
+        Ok(Box::new(Sheared::of(case.fabric()?, simulation, tables)?))
     }
 
     fn curves(&self, results: &Results, page: &mut Page) -> Result<()> {
-        page::curves(results, page)
+        curves(results, page)
     }
 
     fn sections(&self, _: &Case, results: &Results, page: &mut Page) -> Result<Vec<String>> {

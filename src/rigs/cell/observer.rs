@@ -28,7 +28,7 @@ const STATED_DEG: [f64; 5] = [5.0, 15.0, 25.0, 35.0, 45.0];
 const NEAR_DEG: f64 = 1.0;
 
 /// The cell observer.
-pub(super) struct Sheared {
+pub(in crate::rigs) struct Sheared {
     /// Reference area, mm².
     area: f64,
     force: CellCurve,
@@ -50,7 +50,7 @@ pub(super) struct Sheared {
 type Means = [[f64; 3]; 2];
 
 impl Sheared {
-    pub(super) fn of(fabric: &Fabric, simulation: &Simulation, tables: &Tables) -> Result<Self> {
+    pub(in crate::rigs) fn of(fabric: &Fabric, simulation: &Simulation, tables: &Tables) -> Result<Self> {
         let mesh = simulation.mesh();
         let measured = |yarn: &crate::case::fabric::Yarn| {
             let measured = yarn.measured.as_ref();

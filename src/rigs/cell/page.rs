@@ -26,7 +26,7 @@ fn tensions(results: &Results, stress: &Columns, page: &mut Page) {
     }
 }
 
-pub(super) fn curves(results: &Results, page: &mut Page) -> Result<()> {
+pub(in crate::rigs) fn curves(results: &Results, page: &mut Page) -> Result<()> {
     let (axis, history) = (results.axis(), &results.history);
     if axis.is_angle() {
         let force = [("f_nor_n_per_mm", "F_nor")];

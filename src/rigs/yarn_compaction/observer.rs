@@ -5,7 +5,7 @@ use crate::case::fabric::Yarn;
 use crate::error::Result;
 use crate::kernel::record::{Record, Recorded};
 use crate::mesh::Mesh;
-use crate::mesh::quality::TONNES_PER_MM2;
+use crate::mesh::quality::{TONNES_PER_MM2, TONNES_PER_MM3};
 use crate::output::appended::Appended;
 use crate::output::rows::Compaction;
 use crate::output::table::Table;
@@ -14,9 +14,6 @@ use crate::rigs::observer::{Loading, Observer, Seen, Tables};
 use crate::settings::material::Material;
 use crate::simulate::Simulation;
 use serde_json::Value;
-
-/// Tonnes per mm³ of a g/cm³.
-const TONNES_PER_MM3: f64 = 1e-9;
 
 /// The observer of a compacted yarn.
 pub(super) struct Pressed {
