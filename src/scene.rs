@@ -34,9 +34,15 @@ pub struct Motion {
     pub components: [bool; 3],
     /// Displacement at the end of a `move` step to 1, mm.
     pub displacement: [f64; 3],
+    /// Motion with the shear angle γ of the schedule, if there is any: of each node the vectors a and b of the displacement
+    /// a (cos γ/2 − 1) + b sin γ/2, mm.
+    pub arcs: Vec<Arc>,
     /// Number of load steps after which the motion acts; with 0 it acts from the start.
     pub after: usize,
 }
+
+/// The vectors by which a node moves along an ellipse, mm: of 1 − cos γ/2, in the opposite direction, and of sin γ/2.
+pub type Arc = [[f64; 3]; 2];
 
 /// A thread node tied to a face of a yarn.
 #[derive(Debug, Clone, Copy)]
@@ -54,6 +60,8 @@ pub struct Prescribed {
     pub mask: u32,
     /// Displacement at full amplitude, mm.
     pub displacement: [f64; 3],
+    /// See [`Motion::arcs`].
+    pub arc: Arc,
     /// See [`Motion::after`].
     pub after: usize,
 }
@@ -81,7 +89,7 @@ impl Scene {
 pub fn prescribed(motions: &[Motion]) -> Result<BTreeMap<usize, Prescribed>, Conflict> {
     let mut by_node = BTreeMap::<usize, Prescribed>::new();
     for (number, motion) in motions.iter().enumerate() {
-        for &node in &motion.nodes {
+        for (place, &node) in motion.nodes.iter().enumerate() {
             let all = by_node.entry(node).or_insert(Prescribed { after: motion.after, ..Prescribed::default() });
             let conflict = |message| Err(Conflict { motion: number, message });
             if all.after != motion.after {
@@ -94,6 +102,7 @@ pub fn prescribed(motions: &[Motion]) -> Result<BTreeMap<usize, Prescribed>, Con
             }
             for k in (0..3).filter(|k| motion.components[*k]) {
                 let displacement = motion.displacement[k];
+                let arc = motion.arcs.get(place).map_or([0.0; 2], |arc| arc.map(|part| part[k]));
                 if all.mask >> k & 1 == 1 && all.displacement[k] != displacement {
                     let axis = ["x", "y", "z"][k];
                     let message = format!(
@@ -103,7 +112,12 @@ pub fn prescribed(motions: &[Motion]) -> Result<BTreeMap<usize, Prescribed>, Con
                     );
                     return conflict(message);
                 }
+                if all.mask >> k & 1 == 1 && all.arc.map(|part| part[k]) != arc {
+                    let message = format!("moves node {node} along another arc than an earlier condition; keep one of them");
+                    return conflict(message);
+                }
                 all.mask |= 1 << k;
+                (all.arc[0][k], all.arc[1][k]) = (arc[0], arc[1]);
                 all.displacement[k] = displacement;
             }
         }

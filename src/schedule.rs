@@ -143,6 +143,8 @@ impl Schedule {
         row.radius_increment = now.radius - last.radius;
         row.motion = (next.motion - now.motion) / dt;
         row.amplitude = now.motion;
+        let [from, to] = [now, next].map(|load| libm::sincos(0.5 * load.angle));
+        (row.sine, row.cosine) = ((to.0 - from.0) / dt, (to.1 - from.1) / dt);
         if let Some(phase) = self.phases.get(self.phase_at(time)) {
             [row.damping_solid, row.damping_thread] = phase.damping;
         }

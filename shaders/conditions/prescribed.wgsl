@@ -28,7 +28,11 @@ fn prescribed(item: u32) {
         let place = node + k * plane;
         let v = velocity[place];
         let force = acceleration[place] / inverse_mass[node];
+#if ARCS
+        let aim = (targets[3u * item + k] * row.motion + arcs[6u * item + k] * row.cosine) + arcs[6u * item + 3u + k] * row.sine;
+#else
         let aim = targets[3u * item + k] * row.motion;
+#endif
         let a = (aim - v * keep_gain.x) / keep_gain.y;
         acceleration[place] = a;
         let mean = (v + aim) * 0.5;

@@ -29,6 +29,8 @@ struct Row {
     damping_thread: f32,
     motion: f32,
     amplitude: f32,
+    cosine: f32,
+    sine: f32,
     affine: f32,
     closing: f32,
     searched: f32,

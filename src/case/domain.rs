@@ -16,6 +16,8 @@ pub enum Domain {
     CellCompaction(CellCompaction),
     /// A rectangle cut from the fabric at an angle and pulled: the bias-extension test.
     Specimen(Specimen),
+    /// A cross-shaped sample in a hinged frame (Fig. 14).
+    PictureFrame(PictureFrame),
     /// A piece of the stitching thread, pulled along its length (Fig. 10 of the paper).
     ThreadTension(ThreadTension),
     /// A piece of the stitching thread, clamped at one end, that bends under its own weight (Fig. 11).
@@ -106,6 +108,41 @@ pub struct Specimen {
     /// Displacement of the clamp at x > 0, away from the other clamp, at the end of the `move` step, mm. Default 60.
     #[schemars(range(min = 0, max = 200))]
     pub displacement_mm: f64,
+}
+
+/// A cross-shaped sample in a hinged frame, whose sides turn in `shear` steps and keep their length. Warps run along y, wefts along x.
+/// In the arms of the cross only the yarns that run to the clamps are left.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PictureFrame {
+    /// Side of the frame from hinge to hinge, mm: L_frame in Eqs 15 to 17 of the paper. Default 120.
+    #[schemars(range(min = 1, max = 300))]
+    pub frame_mm: f64,
+    /// Side of the square in the middle where both plies are, mm: L_fabric in Eq. 17. Default 80.
+    #[schemars(range(min = 1, max = 300))]
+    pub fabric_mm: f64,
+    /// How the ends of yarns are held. Default `pinned`.
+    pub clamps: FrameClamps,
+    /// Strain by which the clamps stretch the yarns in a `move` step to 1 before the frame shears. Default 0: there is no such step.
+    #[schemars(range(min = 0, max = 0.05))]
+    pub tension_strain: f64,
+}
+
+impl Default for PictureFrame {
+    fn default() -> Self {
+        Self { frame_mm: 120.0, fabric_mm: 80.0, clamps: FrameClamps::Pinned, tension_strain: 0.0 }
+    }
+}
+
+/// How a picture frame holds the ends of yarns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FrameClamps {
+    /// By the fibres in the middle of each yarn, as by a needle: yarns turn with the frame.
+    #[default]
+    Pinned,
+    /// By all fibres: as the frame turns, every yarn is sheared by the angle of the frame, since its fibres keep their length.
+    Glued,
 }
 
 /// When clamps begin to hold.

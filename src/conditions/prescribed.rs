@@ -19,12 +19,13 @@ pub struct Params {
     pub first_thread: u32,
 }
 
-/// Replaces the accelerations of prescribed components before the fibre lines use them; `DAMPING` as for the integration.
-pub struct Prescribed<const DAMPING: bool>;
+/// Replaces the accelerations of prescribed components before the fibre lines use them; `DAMPING` as for the integration; with
+/// `ARCS` nodes move along arcs as well.
+pub struct Prescribed<const DAMPING: bool, const ARCS: bool>;
 
-impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
+impl<const DAMPING: bool, const ARCS: bool> Kernel for Prescribed<DAMPING, ARCS> {
     const SHADER: Shader = Shader {
-        defines: &[when(DAMPING, "DAMPING")],
+        defines: &[when(DAMPING, "DAMPING"), when(ARCS, "ARCS")],
         constants: &[&position::CONSTANTS],
         ..Shader::new("conditions/prescribed", "prescribed")
     };
@@ -33,6 +34,8 @@ impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
         Slot::read("nodes", Uint),
         // displacement at full amplitude, mm (3)
         Slot::read("targets", Scalar),
+        // displacement by cos γ/2 − 1 (3) and by sin γ/2 (3), mm
+        Slot::read("arcs", Scalar).when(ARCS),
         Slot::read("velocity", Scalar),
         Slot::read("mass", Scalar),
         Slot::scatter("acceleration", Scalar),
@@ -48,6 +51,7 @@ impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
     fn run<L: Lane>(io: &Io<L::Scalar>, items: Range<usize>) {
         let Params { first_thread } = io.params();
         let (nodes, targets) = (io.uints(slot!(Self::SLOTS, "nodes")), io.scalars(slot!(Self::SLOTS, "targets")));
+        let arcs = if ARCS { io.scalars(slot!(Self::SLOTS, "arcs", ARCS)) } else { &[] };
         let velocity = io.view::<L::Scalar>(slot!(Self::SLOTS, "velocity"));
         let mass = io.scalars(slot!(Self::SLOTS, "mass"));
         let plane = mass.len();
@@ -68,7 +72,10 @@ impl<const DAMPING: bool> Kernel for Prescribed<DAMPING> {
                 let place = node + k * plane;
                 let v = velocity.get(place);
                 let force = acceleration.get(place) / inverse.get(node);
-                let target = targets[3 * item + k] * row.motion;
+                let mut target = targets[3 * item + k] * row.motion;
+                if ARCS {
+                    target = target + arcs[6 * item + k] * row.cosine + arcs[6 * item + 3 + k] * row.sine;
+                }
                 let a = (target - v * keep) / gain;
                 acceleration.set(place, a);
                 let mean = (v + target) * L::Scalar::from_f64(0.5);

@@ -1,4 +1,5 @@
-//! The specimen of a bias-extension test: a rectangle cut from the fabric at an angle, its length along x.
+//! Pieces cut from the fabric: the specimen of a bias-extension test, a rectangle at an angle with its length along x, and the
+//! cross-shaped sample of a picture frame, in whose arms only the yarns that run to the clamps are left.
 //!
 //! Yarns are cut with all their fibres in the planes of the cut. Inside, slices are perpendicular to the fibre. Towards an end,
 //! each fibre line is stretched or shortened until its last node lies in the cut, so every element stays a hexahedron. At the
@@ -28,24 +29,46 @@ const BLEND: f64 = 2.0;
 
 /// Builds a specimen.
 pub fn build(case: &Case, fabric: &Fabric, specimen: &Specimen) -> Result<Mesh> {
+    let cut = Cut::new(specimen.half(), specimen.warp_angle_deg);
+    piece(case, fabric, "domain.specimen", [&cut; 3])
+}
+
+/// Builds the sample of a picture frame about the origin, its warps along y: a square of a side, mm, with arms of a length, mm.
+///
+/// # Errors
+/// As of [`build`].
+pub fn cross(case: &Case, fabric: &Fabric, side: f64, arm: f64) -> Result<Mesh> {
+    let (half, whole) = (0.5 * side, 0.5 * side + arm);
+    let cuts = [[half, whole], [whole, half], [half, half]].map(|half| Cut::new(half, 90.0));
+    piece(case, fabric, "domain.picture_frame", cuts.each_ref())
+}
+
+/// Builds a piece with cuts of its warps, wefts and threads; `path` names it in messages.
+fn piece(case: &Case, fabric: &Fabric, path: &str, [warps, wefts, threads]: [&Cut; 3]) -> Result<Mesh> {
     let resolution = &case.resolution.refined();
     check::fabric(fabric)?;
     check::resolution(resolution)?;
     let layout = Layout::new(fabric)?;
-    let cut = Cut::new(specimen);
-    let area = 4.0 * cut.half[0] * cut.half[1];
-    let lines = |columns: usize| (columns + 1) as f64 * (resolution.layers + 1) as f64;
-    let nodes = area / resolution.slice_mm
-        * (lines(resolution.warp_columns) / layout.pitch[0] + lines(resolution.weft_columns) / layout.pitch[1]);
+    let lines = |columns: usize, cut: &Cut, pitch: f64| {
+        (columns + 1) as f64 * (resolution.layers + 1) as f64 * 4.0 * cut.half[0] * cut.half[1] / pitch
+    };
+    let nodes = lines(resolution.warp_columns, warps, layout.pitch[0])
+        + lines(resolution.weft_columns, wefts, layout.pitch[1]);
+    let nodes = nodes / resolution.slice_mm;
     require(nodes <= MOST_NODES, "resolution", || {
         format!("asks for {nodes:.1e} nodes, more than {MOST_NODES:.0e}; coarsen it or choose a smaller specimen")
     })?;
     let mut mesh = Mesh { friction: fabric.friction, ..Mesh::default() };
     let [warp, weft] = [(Ply::Warp, &fabric.warp), (Ply::Weft, &fabric.weft)];
-    for (ply, yarn) in [warp, weft] {
-        add_ply(&mut mesh, &cut, &layout, ply, yarn, resolution)?;
+    for ((ply, yarn), cut) in [warp, weft].into_iter().zip([warps, wefts]) {
+        if !add_ply(&mut mesh, cut, &layout, ply, yarn, resolution)? {
+            let name = if ply == Ply::Warp { "warp" } else { "weft" };
+            let message =
+                format!("holds no {name} of {FEWEST_COLUMNS} columns and a slice; enlarge it or refine resolution");
+            return Err(Error::geometry(path, message));
+        }
     }
-    add_threads(&mut mesh, &cut, &layout, fabric, resolution)?;
+    add_threads(&mut mesh, threads, &layout, fabric, resolution)?;
     check::contact(case, fabric, &mesh)?;
     Ok(mesh)
 }
@@ -58,9 +81,9 @@ struct Cut {
 }
 
 impl Cut {
-    fn new(specimen: &Specimen) -> Self {
-        let (sin, cos) = libm::sincos(specimen.warp_angle_deg.to_radians());
-        Self { half: specimen.half(), axes: [[sin, -cos], [cos, sin]] }
+    fn new(half: [f64; 2], warp_angle_deg: f64) -> Self {
+        let (sin, cos) = libm::sincos(warp_angle_deg.to_radians());
+        Self { half, axes: [[sin, -cos], [cos, sin]] }
     }
 
     /// Largest coordinate of the rectangle along an axis of the fabric.
@@ -97,8 +120,15 @@ impl Cut {
     }
 }
 
-/// Adds the yarns of a ply.
-fn add_ply(mesh: &mut Mesh, cut: &Cut, layout: &Layout, ply: Ply, yarn: &Yarn, resolution: &Resolution) -> Result<()> {
+/// Adds the yarns of a ply; whether there are any.
+fn add_ply(
+    mesh: &mut Mesh,
+    cut: &Cut,
+    layout: &Layout,
+    ply: Ply,
+    yarn: &Yarn,
+    resolution: &Resolution,
+) -> Result<bool> {
     // columns run across the fibre such that slices, columns and layers are right-handed
     let [weft, warp] = cut.axes;
     let (name, section, columns, middle, along, across, axis, half_pitch): (_, &Section, _, _, _, _, _, f64) = match ply
@@ -151,12 +181,7 @@ fn add_ply(mesh: &mut Mesh, cut: &Cut, layout: &Layout, ply: Ply, yarn: &Yarn, r
         check::shape(mesh, &block, name)?;
         mesh.blocks.push(block);
     }
-    if mesh.blocks.len() == before {
-        let message =
-            format!("holds no {name} of {FEWEST_COLUMNS} columns and a slice; enlarge it or refine resolution");
-        return Err(Error::geometry("domain.specimen", message));
-    }
-    Ok(())
+    Ok(mesh.blocks.len() > before)
 }
 
 /// One yarn seen along z: the extent of its fibre lines, and the slices between their median ends.

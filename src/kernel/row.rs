@@ -30,6 +30,9 @@ pub struct Row<R> {
     /// Rate of the amplitude of prescribed motion, 1/s, and the amplitude.
     pub motion: R,
     pub amplitude: R,
+    /// Rates of cos γ/2 and sin γ/2 of the shear angle γ, 1/s.
+    pub cosine: R,
+    pub sine: R,
     /// Upper bound of the speed at which the macroscopic deformation brings two near bodies together, mm/s.
     pub affine: R,
     /// Share of the motion that closes gaps: one, or zero while displacements are tried about a state.
@@ -57,6 +60,8 @@ impl Row<f64> {
             damping_thread: r(self.damping_thread),
             motion: r(self.motion),
             amplitude: r(self.amplitude),
+            cosine: r(self.cosine),
+            sine: r(self.sine),
             affine: r(self.affine),
             closing: r(self.closing),
             searched: r(self.searched),

@@ -48,7 +48,7 @@ pub fn normalised_force(stress: [[f64; 2]; 2], angle: f64, stretch: [f64; 2], ar
     power / (area * angle.cos())
 }
 
-/// F_nor of a periodic cell from row to row, N/mm. Since ∫ A₀ F_nor cos γ dγ is the external work, the work between two angles
+/// F_nor of a periodic cell or a picture frame from row to row, N/mm. Since ∫ A₀ F_nor cos γ dγ is the external work, the work between two angles
 /// gives the mean force.
 #[derive(Debug, Clone, Copy)]
 pub struct CellCurve {
@@ -60,7 +60,12 @@ pub struct CellCurve {
 impl CellCurve {
     /// For an unsheared cell.
     pub fn new(mesh: &Mesh) -> Self {
-        Self { area: mesh.period.map_or(f64::NAN, |[x, y]| x * y), last: [0.0; 2] }
+        Self::of(mesh.period.map_or(f64::NAN, |[x, y]| x * y))
+    }
+
+    /// For an unsheared fabric of a reference area, mm².
+    pub fn of(area: f64) -> Self {
+        Self { area, last: [0.0; 2] }
     }
 
     /// Continues from an angle, rad, and the external work up to that angle, mJ.
@@ -101,6 +106,11 @@ pub fn membrane_forces(stress: [[f64; 2]; 2], angle: f64, area: f64) -> [f64; 2]
 /// other diagonal is pulled.
 pub fn corner_force(normalised: f64, angle: f64) -> f64 {
     normalised * 1.0_f64.copysign(angle) * (1.0 + angle.abs().sin())
+}
+
+/// Displacement of the machine that shears a picture frame of side `side` to an angle: Eq. 15 solved for it.
+pub fn frame_displacement(angle: f64, side: f64) -> f64 {
+    2.0 * side * (FRAC_PI_4 - 0.5 * angle).cos() - SQRT_2 * side
 }
 
 /// Shear angle in a picture frame of side `side` at a machine `displacement` (Eq. 15 with 90° for the printed 45°, so that γ(0)

@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
-use crate::scene::{Scene, prescribed};
+use crate::scene::{Arc, Scene, prescribed};
+use crate::settings::steps::Step;
 
 /// Mask of the prescribed components of each of so many nodes, from the node and mask of each condition.
 pub fn masks(conditions: &[u32], count: usize) -> Vec<u32> {
@@ -20,6 +21,10 @@ pub struct Conditions {
     pub nodes: Vec<u32>,
     /// Displacement at full amplitude, mm, three numbers per condition.
     pub targets: Vec<f64>,
+    /// Arcs, six numbers per condition, if any node moves along one.
+    pub arcs: Vec<f64>,
+    /// Largest shear angle of the schedule, rad.
+    farthest: f64,
     /// Number of load steps after which each condition acts.
     pub after: Vec<usize>,
     /// Whether each node of the mesh is always fully prescribed.
@@ -40,10 +45,17 @@ impl Conditions {
         for (node, _) in by_node.iter().filter(|(_, all)| all.mask == 7 && all.after == 0) {
             held[*node] = true;
         }
+        let curved = by_node.values().any(|all| all.arc != Arc::default());
+        let angles = scene.steps.iter().map(|step| match step {
+            Step::Shear { angle_deg, .. } => angle_deg.to_radians().abs(),
+            _ => 0.0,
+        });
         Ok(Self {
             held,
             nodes: by_node.iter().flat_map(|(node, all)| [*node as u32, all.mask]).collect(),
             targets: by_node.values().flat_map(|all| all.displacement).collect(),
+            arcs: if curved { by_node.values().flat_map(|all| all.arc).flatten().collect() } else { Vec::new() },
+            farthest: angles.fold(0.0, f64::max),
             after: by_node.values().map(|all| all.after).collect(),
         })
     }
@@ -63,9 +75,19 @@ impl Conditions {
         masks(&self.nodes, count)
     }
 
-    /// Final position of each prescribed node, mm.
+    /// Final positions of each prescribed node, mm: at full amplitude, and at the largest shear angle to either side.
     pub fn ends<'a>(&'a self, mesh: &'a Mesh) -> impl Iterator<Item = [f64; 3]> + 'a {
-        let moved = |(n, by): (&[u32], &[f64])| [0, 1, 2].map(|k| mesh.nodes[n[0] as usize][k] + by[k]);
-        self.nodes.chunks_exact(2).zip(self.targets.chunks_exact(3)).map(moved)
+        let (sin, cos) = libm::sincos(0.5 * self.farthest);
+        let arcs = self.arcs.chunks_exact(6).map(Some).chain(std::iter::repeat(None));
+        let all = self.nodes.chunks_exact(2).zip(self.targets.chunks_exact(3)).zip(arcs);
+        all.flat_map(move |((n, by), arc)| {
+            let at = |side: f64| {
+                [0, 1, 2].map(|k| {
+                    let turned = arc.map_or(0.0, |arc| arc[k] * (cos - 1.0) + side * arc[3 + k] * sin);
+                    mesh.nodes[n[0] as usize][k] + by[k] + turned
+                })
+            };
+            [at(1.0), at(-1.0)]
+        })
     }
 }

@@ -12,8 +12,10 @@ mod constituents;
 mod crossings;
 pub mod inline;
 pub mod observer;
+mod picture_frame;
 pub mod read;
 mod thread_tension;
+mod ties;
 mod tools;
 mod yarn_compaction;
 mod yarn_shear;
@@ -89,6 +91,7 @@ pub fn of(domain: &Domain) -> &dyn Rig {
         Domain::Cell(cell) => cell,
         Domain::CellCompaction(compaction) => compaction,
         Domain::Specimen(specimen) => specimen,
+        Domain::PictureFrame(frame) => frame,
         Domain::ThreadTension(tension) => tension,
         Domain::Cantilever(cantilever) => cantilever,
         Domain::YarnShear(shear) => shear,
@@ -103,6 +106,7 @@ pub fn of_mut(domain: &mut Domain) -> &mut dyn Rig {
         Domain::Cell(cell) => cell,
         Domain::CellCompaction(compaction) => compaction,
         Domain::Specimen(specimen) => specimen,
+        Domain::PictureFrame(frame) => frame,
         Domain::ThreadTension(tension) => tension,
         Domain::Cantilever(cantilever) => cantilever,
         Domain::YarnShear(shear) => shear,

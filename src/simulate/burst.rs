@@ -55,7 +55,8 @@ impl Simulation {
         let load = self.load();
         let (stretch, then) = (self.stretch(), self.stretch_at_search);
         let strained = [0, 1].map(|k| (stretch[k] - then[k]).abs()).into_iter().fold(0.0, f64::max);
-        let affine = ((load.angle - self.gradient_at_search.angle).abs() + strained) * AFFINE_REACH;
+        let turned = if self.model.active.periodic { (load.angle - self.gradient_at_search.angle).abs() } else { 0.0 };
+        let affine = (turned + strained) * AFFINE_REACH;
         let contact = self.scene.effects.contact.as_ref().filter(|_| self.model.active.searches());
         let skin = contact.map_or(f64::INFINITY, |c| c.skin_mm);
         let Shares { used, apart } = Shares::new(self.model.active.periodic);

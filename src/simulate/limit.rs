@@ -101,6 +101,8 @@ impl Simulation {
             thermal_increment: 0.0,
             radius_increment: 0.0,
             motion: 0.0,
+            cosine: 0.0,
+            sine: 0.0,
             closing: 0.0,
             ..row
         };

@@ -230,7 +230,9 @@ impl Simulation {
     }
     /// The row of a step of `dt` from `time`, preceded by a step of `before`.
     fn row(&self, time: f64, dt: f64, before: f64) -> Row<f64> {
-        self.schedule.row(time, dt, before, |time| self.stretch.at(time))
+        let row = self.schedule.row(time, dt, before, |time| self.stretch.at(time));
+        // only a cell deforms as a whole; in a free scene the shear angle is that of a frame
+        if self.model.active.periodic { row } else { Row { gradient: [[0.0; 3]; 3], rate: [[0.0; 3]; 3], ..row } }
     }
     /// Bodies in their reference position.
     pub fn mesh(&self) -> &Mesh {

@@ -195,7 +195,7 @@ fn check(name: &str, stage: &Stage, buffers: &[Description]) {
         let names: Vec<Field<&str>> = members.iter().map(|(n, o, s)| (n.as_str(), *o, *s)).collect();
         let row = fields!(
             Row<f32>: gradient, rate, dt, dt_mid, thermal, thermal_increment, radius, radius_increment, damping_solid,
-            damping_thread, motion, amplitude, affine, closing, searched, turn
+            damping_thread, motion, amplitude, cosine, sine, affine, closing, searched, turn
         );
         assert_eq!(names, row, "{name}: row");
     }

@@ -29,6 +29,7 @@ pub(super) fn motions(specimen: &Specimen, mesh: &Mesh, steps: &[Step]) -> Vec<M
         components: [true; 3],
         displacement: [way, 0.0, 0.0],
         after,
+        ..Motion::default()
     };
     vec![clamp("held clamp", held, 0.0), clamp("moved clamp", moved, specimen.displacement_mm)]
 }

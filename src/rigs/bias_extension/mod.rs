@@ -6,12 +6,12 @@ mod findings;
 mod observer;
 mod page;
 pub mod theory;
-mod ties;
 pub mod zones;
 
 pub use clamps::clamped;
 
 use super::observer::{Observer, Tables};
+use super::ties::ties;
 use super::{Piece, Rig, crossings};
 use crate::case::Case;
 use crate::case::domain::{Specimen, ThreadEnds};
@@ -35,7 +35,10 @@ impl Rig for Specimen {
     fn piece(&self, case: &Case) -> Result<Piece> {
         let mesh = fabric::specimen::build(case, case.fabric()?, self)?;
         let motions = clamps::motions(self, &mesh, &case.steps);
-        let ties = ties::ties(self, &mesh);
+        let ties = match self.thread_ends {
+            ThreadEnds::Held => ties(&mesh, clamped(self, &mesh).concat()),
+            ThreadEnds::Free => Vec::new(),
+        };
         Ok(Piece { mesh, motions, ties })
     }
 

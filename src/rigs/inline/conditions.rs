@@ -24,7 +24,7 @@ pub(super) fn motions(inline: &InlineMesh, mesh: &Mesh) -> Result<Vec<Motion>> {
             nodes: own.flat_map(|(_, first, count)| first..first + count).filter(|n| inside(&mesh.nodes[*n])).collect(),
             components: condition.components,
             displacement: condition.displacement_mm,
-            after: 0,
+            ..Motion::default()
         }
     };
     let motions: Vec<Motion> = inline.conditions.iter().enumerate().map(motion).collect();

@@ -1,7 +1,5 @@
 //! Ties of cut threads: which thread nodes are tied to yarns, and where.
 
-use super::clamps::clamped;
-use crate::case::domain::{Specimen, ThreadEnds};
 use crate::contact::face::{Patch, closest};
 use crate::mesh::surface::Surface;
 use crate::mesh::vector::{norm, sub};
@@ -25,12 +23,8 @@ struct Held {
     far: f64,
 }
 
-/// Ties of a specimen with held thread ends; empty if the ends are free.
-pub(super) fn ties(specimen: &Specimen, mesh: &Mesh) -> Vec<Tie> {
-    if specimen.thread_ends == ThreadEnds::Free {
-        return Vec::new();
-    }
-    let mut clamped = clamped(specimen, mesh).concat();
+/// Ties of the cut threads of a piece; ends at the nodes `clamped` are held already.
+pub(super) fn ties(mesh: &Mesh, mut clamped: Vec<usize>) -> Vec<Tie> {
     clamped.sort_unstable();
     let mut held = BTreeMap::new();
     for thread in &mesh.threads {
