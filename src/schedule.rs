@@ -61,8 +61,8 @@ pub fn ramp(t: f64) -> f64 {
 }
 
 impl Schedule {
-    /// The schedule of a case.
-    pub fn new(steps: &[Step], effects: &Effects) -> Self {
+    /// The schedule of a case; `in_cell` for a periodic scene.
+    pub fn new(steps: &[Step], effects: &Effects, in_cell: bool) -> Self {
         let initial_radius = effects.contact.as_ref().map_or(1.0, |c| c.initial_radius_ratio);
         let pretensioned = steps.iter().any(|s| matches!(s, Step::Pretension { .. }));
         let radius = if pretensioned { initial_radius } else { 1.0 };
@@ -84,6 +84,8 @@ impl Schedule {
             let end = start + step.time();
             let damping = effects.damping.as_ref().map_or([0.0; 2], |d| match step {
                 Step::Settle { .. } | Step::Pretension { .. } => [d.rate_per_s, d.thread_settle_rate_per_s],
+                // in a cell damping acts on the fluctuation only
+                Step::Shear { .. } if !in_cell => [d.move_rate_per_s.unwrap_or(d.rate_per_s); 2],
                 Step::Hold { .. } | Step::Shear { .. } | Step::Stretch { .. } => [d.rate_per_s; 2],
                 Step::Move { .. } => [d.move_rate_per_s.unwrap_or(d.rate_per_s); 2],
             });
@@ -162,7 +164,7 @@ mod tests {
         let damping = Damping { rate_per_s: 3.0, thread_settle_rate_per_s: 5.0, move_rate_per_s: Some(2.0) };
         let effects = Effects { damping: Some(damping), ..Effects::default() };
         let steps = [Step::Pretension { time_s: 1.0 }, Step::Hold { time_s: 1.0 }, Step::Move { to: 1.0, time_s: 1.0 }];
-        let schedule = Schedule::new(&steps, &effects);
+        let schedule = Schedule::new(&steps, &effects, false);
         let rates = |time: f64| {
             let row = schedule.row(time, 1e-3, 1e-3, |_| [1.0; 2]);
             [row.damping_solid, row.damping_thread]
@@ -177,7 +179,7 @@ mod tests {
             Step::Hold { time_s: 1.0 },
             Step::Shear { angle_deg: 50.0, time_s: 4.0 },
         ];
-        let schedule = Schedule::new(&steps, &Effects::default());
+        let schedule = Schedule::new(&steps, &Effects::default(), true);
         assert_eq!(schedule.load(2.0).thermal, 1.0);
         assert_eq!(schedule.load(3.0).angle, 0.0);
         assert!((schedule.load(7.0).angle.to_degrees() - 50.0).abs() < 1e-12);
@@ -191,7 +193,7 @@ mod tests {
     #[test]
     fn every_move_goes_on_from_where_the_last_one_ended() {
         let to = |to: f64| Step::Move { to, time_s: 1.0 };
-        let schedule = Schedule::new(&[to(0.5), to(-0.25), to(1.0)], &Effects::default());
+        let schedule = Schedule::new(&[to(0.5), to(-0.25), to(1.0)], &Effects::default(), false);
         assert_eq!([0.0, 1.0, 2.0, 3.0].map(|t| schedule.load(t).motion), [0.0, 0.5, -0.25, 1.0]);
         assert_eq!(schedule.load(1.5).motion, 0.125);
     }

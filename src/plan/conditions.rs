@@ -24,7 +24,7 @@ pub struct Conditions {
     /// Arcs, six numbers per condition, if any node moves along one.
     pub arcs: Vec<f64>,
     /// Largest shear angle of the schedule, rad.
-    farthest: f64,
+    pub farthest: f64,
     /// Number of load steps after which each condition acts.
     pub after: Vec<usize>,
     /// Whether each node of the mesh is always fully prescribed.

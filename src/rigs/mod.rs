@@ -13,9 +13,11 @@ mod crossings;
 pub mod inline;
 pub mod observer;
 mod picture_frame;
+mod pull_out;
 pub mod read;
 mod thread_tension;
 mod ties;
+mod tool_friction;
 mod tools;
 mod yarn_compaction;
 mod yarn_shear;
@@ -92,6 +94,8 @@ pub fn of(domain: &Domain) -> &dyn Rig {
         Domain::CellCompaction(compaction) => compaction,
         Domain::Specimen(specimen) => specimen,
         Domain::PictureFrame(frame) => frame,
+        Domain::PullOut(pulled) => pulled,
+        Domain::ToolFriction(friction) => friction,
         Domain::ThreadTension(tension) => tension,
         Domain::Cantilever(cantilever) => cantilever,
         Domain::YarnShear(shear) => shear,
@@ -107,6 +111,8 @@ pub fn of_mut(domain: &mut Domain) -> &mut dyn Rig {
         Domain::CellCompaction(compaction) => compaction,
         Domain::Specimen(specimen) => specimen,
         Domain::PictureFrame(frame) => frame,
+        Domain::PullOut(pulled) => pulled,
+        Domain::ToolFriction(friction) => friction,
         Domain::ThreadTension(tension) => tension,
         Domain::Cantilever(cantilever) => cantilever,
         Domain::YarnShear(shear) => shear,

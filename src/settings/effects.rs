@@ -112,7 +112,7 @@ pub struct Damping {
     /// Rate for threads during pretension and settle steps, 1/s. Default 20000.
     #[schemars(range(min = 0, max = 1e7))]
     pub thread_settle_rate_per_s: f64,
-    /// Rate for every node during move steps, 1/s. There the fabric moves as a whole, and the damping acts like a surrounding
+    /// Rate for every node during move steps, and shear steps of a picture frame, 1/s. There the fabric moves as a whole, and the damping acts like a surrounding
     /// medium at rest. `null` (the default) takes `rate_per_s`.
     #[schemars(range(min = 0, max = 1e7))]
     pub move_rate_per_s: Option<f64>,

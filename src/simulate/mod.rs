@@ -150,7 +150,7 @@ impl Simulation {
     pub fn with_capacity(scene: Scene, config: BackendConfig, capacity: Capacity) -> Result<Self> {
         let model = plan::build(&scene, capacity)?;
         let backend = config.backend(&model)?;
-        let schedule = Schedule::new(&scene.steps, &scene.effects);
+        let schedule = Schedule::new(&scene.steps, &scene.effects, scene.mesh.period.is_some());
         Ok(Self {
             gradient_at_search: schedule.load(0.0),
             stretch_at_search: [1.0; 2],

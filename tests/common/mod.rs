@@ -94,6 +94,16 @@ pub fn held_specimen() -> Value {
     )
 }
 
+/// A small sample in a picture frame, tightened fast, whose yarns are stretched and then sheared.
+pub fn framed() -> Value {
+    let domain = json!({ "picture_frame": { "frame_mm": 20, "fabric_mm": 12, "tension_strain": 1e-4 } });
+    let steps = json!([
+        { "pretension": { "time_s": 1.5e-4 } }, { "move": { "time_s": 5e-5 } },
+        { "shear": { "angle_deg": 0.5, "time_s": 1e-4 } }
+    ]);
+    with(coarse_cell(), &[("/domain", domain), ("/steps", steps)])
+}
+
 /// A quiet run on the CPU that leaves its results in a folder.
 pub fn options(output: PathBuf, threads: usize) -> Options {
     Options {

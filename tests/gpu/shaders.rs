@@ -2,7 +2,7 @@
 //! with the layout that Rust gives them, as naga parses it.
 
 use super::scenes;
-use crate::common::{bare, block, charmetant, coarse_cell, held_specimen, loaded, neo_hookean, reduced, with};
+use crate::common::{bare, block, charmetant, coarse_cell, framed, held_specimen, loaded, neo_hookean, reduced, with};
 use naga::{AddressSpace, ScalarKind, StorageAccess, TypeInner};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -58,6 +58,7 @@ pub(super) fn scenes() -> Vec<(&'static str, Value)> {
         ("cell", cell),
         ("cell without contact mass", without_mass),
         ("specimen", specimen),
+        ("frame", framed()),
         ("free", free.clone()),
         ("free with lines and contact", lines),
         ("without gravity", falling),

@@ -3,7 +3,7 @@
 //! set.
 
 use super::scenes::{free, tools};
-use crate::common::{Random, advance, coarse_cell, held_specimen, loaded, reduced};
+use crate::common::{Random, advance, coarse_cell, framed, held_specimen, loaded, reduced};
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock, OnceLock};
 use tricot::backend::Backend;
@@ -373,6 +373,7 @@ fn every_stage_agrees_with_the_cpu_on_every_buffer() {
     let cases = [
         (coarse_cell(), 2.5e-4),
         (held_specimen(), 1.2e-4),
+        (framed(), 2.5e-4),
         (free(), 1e-4),
         (reduced(coarse_cell()), 1.2e-4),
         (reduced(free()), 1e-4),

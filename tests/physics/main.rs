@@ -12,6 +12,7 @@ mod crossings;
 mod drag;
 mod effects;
 mod elements;
+mod frame;
 mod friction;
 mod geometry;
 mod gravity;

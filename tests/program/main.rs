@@ -15,6 +15,7 @@ mod notes;
 mod report;
 mod reproducible;
 mod retries;
+mod rigs;
 mod run;
 mod schema;
 mod structure;

@@ -56,11 +56,6 @@ impl Rig for CellCompaction {
             );
             return Err(Error::case("domain.cell_compaction.thickness_mm", message));
         }
-        let plate = |name: &str, z: f64, turned: f64, way: f64| Tool {
-            turned_deg: [turned, 0.0, 0.0],
-            displacement_mm: [0.0, 0.0, way],
-            ..Tool::held(name, Shape::Plane, [0.0, 0.0, z])
-        };
         mesh.tools = vec![
             plate("lower plate", low - CLEARANCE, 0.0, way),
             plate("upper plate", high + CLEARANCE, 180.0, -way),
@@ -99,8 +94,17 @@ impl Rig for CellCompaction {
     }
 }
 
+/// A smooth plate at a height, mm, turned about x by an angle, degrees, that moves along z by a way, mm.
+pub(super) fn plate(name: &str, z: f64, turned: f64, way: f64) -> Tool {
+    Tool {
+        turned_deg: [turned, 0.0, 0.0],
+        displacement_mm: [0.0, 0.0, way],
+        ..Tool::held(name, Shape::Plane, [0.0, 0.0, z])
+    }
+}
+
 /// Lowest and highest point of yarns and threads, mm.
-fn heights(mesh: &Mesh) -> [f64; 2] {
+pub(super) fn heights(mesh: &Mesh) -> [f64; 2] {
     let yarns = mesh.nodes[..mesh.first_thread_node()].iter().map(|node| (node[2], 0.0));
     let threads = mesh.threads.iter().flat_map(|thread| {
         mesh.nodes[thread.first..thread.first + thread.count].iter().map(|node| (node[2], thread.radius))

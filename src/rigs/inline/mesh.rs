@@ -133,7 +133,7 @@ mod tests {
         let base =
             r#""name": "b", "density_t_mm3": 1e-9, "material": { "neo_hookean": { "young_mpa": 1, "poisson": 0.3 } }"#;
         let block = serde_json::from_str(&format!("{{ {base}, {json} }}")).unwrap();
-        build(&InlineMesh { blocks: vec![block], threads: vec![], friction: Friction::default(), conditions: vec![] })
+        build(&InlineMesh { blocks: vec![block], threads: vec![], friction: Friction::default(), conditions: vec![], tools: vec![] })
     }
 
     #[test]
@@ -167,6 +167,7 @@ mod tests {
             threads: vec![serde_json::from_str(thread).unwrap()],
             friction: Friction::default(),
             conditions: vec![],
+            tools: vec![],
         };
         let message = build(&inline).unwrap_err().to_string();
         assert!(message.contains("threads[0].nodes[1]"), "{message}");

@@ -22,6 +22,8 @@ use std::path::{Path, PathBuf};
 const ANGLES: [f64; 3] = [15.0, 30.0, 45.0];
 /// Largest angle between a stated one and the end of a curve, degrees.
 const NEAR: f64 = 1.0;
+/// Pressure at which the thickness is stated, MPa: that of a vacuum bag.
+const PRESSURE: f64 = 0.1;
 /// Least change of the angle over a row, degrees: F_nor is the work over it.
 const LEAST: f64 = 0.1;
 
@@ -167,6 +169,15 @@ impl Done {
                     numbers.push(given(format!("F_nor at {angle}°"), "N/mm", value(&curve[..turn], angle.min(end))));
                 }
             }
+            Curve::Compaction => {
+                let [thickness, share] = compacted(folder)?;
+                for (name, unit, points) in [("thickness", "mm", &thickness), ("fibre volume fraction", "–", &share)] {
+                    if points.last().is_some_and(|[end, _]| *end >= PRESSURE) {
+                        numbers.push(given(format!("{name} at {PRESSURE} MPa"), unit, value(points, PRESSURE)));
+                    }
+                }
+                curve = thickness.into_iter().map(|[pressure, thickness]| [thickness, pressure]).collect();
+            }
             Curve::Tension { of_warp } => {
                 let stress = Columns::read(&folder.join("stress.csv"))?;
                 let ply = if of_warp { "warp" } else { "weft" };
@@ -193,6 +204,16 @@ fn sheared(history: &Columns) -> Vec<[f64; 2]> {
         [middle.abs(), if middle < 0.0 { -forces[row] } else { forces[row] }]
     });
     points.filter(|[_, force]| force.is_finite()).collect()
+}
+
+/// Thickness, mm, and fibre volume fraction of a fabric over the pressure of the plates, MPa, while they come together.
+fn compacted(folder: &Path) -> Result<[Vec<[f64; 2]>; 2]> {
+    let (plates, history) = (Columns::read(&folder.join("plates.csv"))?, Columns::read(&folder.join("history.csv"))?);
+    let (phases, pressure) = (history.texts("phase"), plates.numbers("upper_pressure_mpa"));
+    Ok(["thickness_mm", "fibre_volume_fraction"].map(|column| {
+        let rows = pressure.iter().zip(plates.numbers(column)).zip(&phases);
+        rows.filter(|((p, _), phase)| **phase == "move" && **p > 0.0).map(|((p, of), _)| [*p, of]).collect()
+    }))
 }
 
 fn write_table(done: &[Done], path: &Path) -> Result<()> {

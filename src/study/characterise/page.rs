@@ -1,5 +1,6 @@
 //! The page of a characterisation: numbers of all tests, curves of tests of the same kind on one chart, and links to their reports.
 
+use super::parts::CARD;
 use super::{Curve, Done, Given};
 use crate::error::Result;
 use crate::output::chart;
@@ -55,7 +56,21 @@ pub(super) fn write(done: &[Done], fabric: &str, path: &Path) -> Result<()> {
         ["strain, %", "N/mm"],
         "The other direction is free of force. Loading and unloading.",
     );
+    figure(
+        &mut page,
+        &|curve| curve == Curve::Compaction,
+        "Pressure of the plates, MPa",
+        ["thickness, mm", "MPa"],
+        "Of a tightened cell, free of membrane forces.",
+    );
     page.raw("</div>");
+    page.heading("For a material card");
+    let card = CARD.map(|need| {
+        let from = done.iter().filter(|done| done.part.gives() == Some(need)).map(|done| done.part.name);
+        let from = from.collect::<Vec<_>>().join(", ");
+        format!("{need}: {}", if from.is_empty() { "not tested here".into() } else { format!("from {from}") })
+    });
+    page.list("findings", &card);
     page.heading("Reports of the tests");
     let links: String = done
         .iter()

@@ -24,12 +24,27 @@ pub(super) enum Curve {
     Shear,
     /// Membrane force over the stretch of the warps or the wefts.
     Tension { of_warp: bool },
+    /// Pressure over thickness.
+    Compaction,
     /// None; its property is a number.
     Property,
 }
 
+const IN_SHEAR: &str = "in-plane shear: force over angle";
+const ALONG_WARPS: &str = "membrane stiffness along the warps";
+const ALONG_WEFTS: &str = "membrane stiffness along the wefts";
+const THROUGH: &str = "compaction through the thickness: pressure over thickness";
+const ON_TOOL: &str = "friction on a tool";
+
+/// What a macroscopic material card of a fabric asks for. No test here gives the bending.
+pub(super) const CARD: [&str; 6] =
+    [IN_SHEAR, ALONG_WARPS, ALONG_WEFTS, THROUGH, ON_TOOL, "bending of the fabric: moment over curvature"];
+
 const CELL: &str = include_str!("../../../cases/unit_cell_shear.json");
 const SPECIMEN: &str = include_str!("../../../cases/bias_extension_small.json");
+const FRAME: &str = include_str!("../../../cases/picture_frame_small.json");
+const ON_A_TOOL: &str = include_str!("../../../cases/tool_friction.json");
+const BETWEEN_PLATES: &str = include_str!("../../../cases/cell_compaction.json");
 const THREAD: &str = include_str!("../../../cases/thread_tension.json");
 const CANTILEVER: &str = include_str!("../../../cases/cantilever.json");
 const COMPACTION: &str = include_str!("../../../cases/yarn_compaction.json");
@@ -37,7 +52,7 @@ const YARN: &str = include_str!("../../../cases/yarn_shear.json");
 
 const PREVIEW: &[&str] = &["accuracy=preview"];
 
-/// A test of a constituent, which is quick anyway.
+/// A test that gives a property, and is quick anyway.
 const fn of_constituent(
     name: &'static str,
     title: &'static str,
@@ -97,6 +112,25 @@ pub(super) const PARTS: &[Part] = &[
         Curve::Tension { of_warp: false },
     ),
     Part {
+        name: "fabric-compaction",
+        title: "Compaction of the fabric between plates",
+        case: BETWEEN_PLATES,
+        changes: &[],
+        quick: PREVIEW,
+        is_long: false,
+        curve: Curve::Compaction,
+    },
+    of_constituent("tool-friction", "Friction of the fabric on a tool", ON_A_TOOL, &[]),
+    Part {
+        name: "picture-frame",
+        title: "Shear of a small sample in a picture frame, its yarns pinned",
+        case: FRAME,
+        changes: &[],
+        quick: &[],
+        is_long: false,
+        curve: Curve::Shear,
+    },
+    Part {
         name: "bias-extension",
         title: "Bias extension of a small specimen",
         case: SPECIMEN,
@@ -108,6 +142,18 @@ pub(super) const PARTS: &[Part] = &[
 ];
 
 impl Part {
+    /// What the test gives to a macroscopic material card.
+    pub fn gives(&self) -> Option<&'static str> {
+        match self.name {
+            "shear" | "shear-other-way" | "picture-frame" | "bias-extension" => Some(IN_SHEAR),
+            "warp-tension" => Some(ALONG_WARPS),
+            "weft-tension" => Some(ALONG_WEFTS),
+            "fabric-compaction" => Some(THROUGH),
+            "tool-friction" => Some(ON_TOOL),
+            _ => None,
+        }
+    }
+
     /// The text of its case, and the changes to it.
     pub fn case(&self, quick: bool) -> (&'static str, impl Iterator<Item = &'static str> + use<>) {
         let quick = if quick { self.quick } else { &[] };
