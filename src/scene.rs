@@ -113,7 +113,8 @@ pub fn prescribed(motions: &[Motion]) -> Result<BTreeMap<usize, Prescribed>, Con
                     return conflict(message);
                 }
                 if all.mask >> k & 1 == 1 && all.arc.map(|part| part[k]) != arc {
-                    let message = format!("moves node {node} along another arc than an earlier condition; keep one of them");
+                    let message =
+                        format!("moves node {node} along another arc than an earlier condition; keep one of them");
                     return conflict(message);
                 }
                 all.mask |= 1 << k;

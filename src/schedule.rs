@@ -24,6 +24,8 @@ pub struct Phase {
     pub stretches: bool,
     from: Load,
     to: Load,
+    /// Amplitudes of prescribed motion from the start to the end, if they are given in between: share of the duration, and value.
+    amplitudes: Vec<[f64; 2]>,
     /// Damping rates of solids and of threads, 1/s.
     damping: [f64; 2],
 }
@@ -60,6 +62,23 @@ pub fn ramp(t: f64) -> f64 {
     }
 }
 
+/// A monotone cubic curve through points whose abscissas increase (Fritsch and Carlson, 1980): it rises and falls as the points do,
+/// with slope zero at both ends and at extremes.
+fn curve(points: &[[f64; 2]], t: f64) -> f64 {
+    let secant = |i: usize| (points[i + 1][1] - points[i][1]) / (points[i + 1][0] - points[i][0]);
+    let slope = |i: usize| {
+        if i == 0 || i + 1 == points.len() || secant(i - 1) * secant(i) <= 0.0 {
+            return 0.0;
+        }
+        2.0 * secant(i - 1) * secant(i) / (secant(i - 1) + secant(i))
+    };
+    let i = (1..points.len() - 1).take_while(|i| points[*i][0] <= t).count();
+    let [[from, low], [to, high]] = [points[i], points[i + 1]];
+    let (width, s) = (to - from, (t - from) / (to - from));
+    let tangents = width * (slope(i) * s * (1.0 - s) * (1.0 - s) - slope(i + 1) * s * s * (1.0 - s));
+    low + (high - low) * smooth(s) + tangents
+}
+
 impl Schedule {
     /// The schedule of a case; `in_cell` for a periodic scene.
     pub fn new(steps: &[Step], effects: &Effects, in_cell: bool) -> Self {
@@ -90,7 +109,13 @@ impl Schedule {
                 Step::Move { .. } => [d.move_rate_per_s.unwrap_or(d.rate_per_s); 2],
             });
             let stretches = matches!(step, Step::Stretch { .. });
-            phases.push(Phase { name: step.name(), start, end, along, stretches, from: load, to, damping });
+            let amplitudes = match step {
+                Step::Move { to, through, .. } if !through.is_empty() => {
+                    [&[[0.0, load.motion]], &through[..], &[[1.0, *to]]].concat()
+                }
+                _ => Vec::new(),
+            };
+            phases.push(Phase { name: step.name(), start, end, along, stretches, from: load, to, amplitudes, damping });
             (load, start) = (to, end);
         }
         Self { phases, initial_radius: radius.min(initial_radius) }
@@ -121,7 +146,10 @@ impl Schedule {
             angle: between(phase.from.angle, phase.to.angle, ramp(t)),
             thermal: between(phase.from.thermal, phase.to.thermal, smooth(t)),
             radius: between(phase.from.radius, phase.to.radius, smooth((2.0 * t).min(1.0))),
-            motion: between(phase.from.motion, phase.to.motion, ramp(t)),
+            motion: match &phase.amplitudes[..] {
+                [] => between(phase.from.motion, phase.to.motion, ramp(t)),
+                points => curve(points, t),
+            },
         }
     }
 
@@ -163,7 +191,11 @@ mod tests {
     fn every_load_step_has_its_damping() {
         let damping = Damping { rate_per_s: 3.0, thread_settle_rate_per_s: 5.0, move_rate_per_s: Some(2.0) };
         let effects = Effects { damping: Some(damping), ..Effects::default() };
-        let steps = [Step::Pretension { time_s: 1.0 }, Step::Hold { time_s: 1.0 }, Step::Move { to: 1.0, time_s: 1.0 }];
+        let steps = [
+            Step::Pretension { time_s: 1.0 },
+            Step::Hold { time_s: 1.0 },
+            Step::Move { to: 1.0, through: vec![], time_s: 1.0 },
+        ];
         let schedule = Schedule::new(&steps, &effects, false);
         let rates = |time: f64| {
             let row = schedule.row(time, 1e-3, 1e-3, |_| [1.0; 2]);
@@ -192,9 +224,27 @@ mod tests {
 
     #[test]
     fn every_move_goes_on_from_where_the_last_one_ended() {
-        let to = |to: f64| Step::Move { to, time_s: 1.0 };
+        let to = |to: f64| Step::Move { to, through: vec![], time_s: 1.0 };
         let schedule = Schedule::new(&[to(0.5), to(-0.25), to(1.0)], &Effects::default(), false);
         assert_eq!([0.0, 1.0, 2.0, 3.0].map(|t| schedule.load(t).motion), [0.0, 0.5, -0.25, 1.0]);
         assert_eq!(schedule.load(1.5).motion, 0.125);
+    }
+
+    #[test]
+    fn a_move_passes_through_its_amplitudes_without_a_kink() {
+        let through = vec![[0.25, 0.8], [0.5, 0.2], [0.75, 0.4]];
+        let schedule = Schedule::new(&[Step::Move { to: 0.9, through, time_s: 4.0 }], &Effects::default(), false);
+        let at = |t: f64| schedule.load(t).motion;
+        for (t, value) in [(0.0, 0.0), (1.0, 0.8), (2.0, 0.2), (3.0, 0.4), (4.0, 0.9)] {
+            assert!((at(t) - value).abs() < 1e-12, "{t}: {}", at(t));
+        }
+        let speed = |t: f64| (at(t + 1e-6) - at(t - 1e-6)) / 2e-6;
+        // extremes and ends are turning points, and between points the curve is monotone
+        assert!([1.0, 2.0].iter().all(|t| speed(*t).abs() < 1e-5) && speed(3.0) > 0.1);
+        for i in 1..400 {
+            let t = 0.01 * f64::from(i);
+            assert!((speed(t + 1e-4) - speed(t - 1e-4)).abs() < 2e-3, "a kink at {t}");
+            assert!((0.0..=0.9).contains(&at(t)));
+        }
     }
 }

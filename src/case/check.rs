@@ -58,7 +58,13 @@ fn steps(case: &Case, provenance: &Provenance) -> Result<()> {
     for (i, step) in case.steps.iter().enumerate() {
         let (now, next, what, field) = match step {
             Step::Shear { angle_deg, .. } => (&mut angle, *angle_deg, "the shear angle", "angle_deg"),
-            Step::Move { to, .. } => (&mut moved, *to, "the share of the displacement", "to"),
+            Step::Move { to, through, .. } if through.is_empty() => {
+                (&mut moved, *to, "the share of the displacement", "to")
+            }
+            Step::Move { to, .. } => {
+                moved = *to;
+                continue;
+            }
             _ => continue,
         };
         if *now == next {
@@ -66,6 +72,18 @@ fn steps(case: &Case, provenance: &Provenance) -> Result<()> {
             return Err(provenance.error(&format!("steps.{i}.{field}"), message));
         }
         *now = next;
+    }
+    for (i, step) in case.steps.iter().enumerate() {
+        let Step::Move { through, .. } = step else { continue };
+        let mut before = 0.0;
+        for (k, [share, _]) in through.iter().enumerate() {
+            if !(*share > before && *share < 1.0) {
+                let message =
+                    format!("{share} of the duration is not between {before} and 1: give shares that increase");
+                return Err(provenance.error(&format!("steps.{i}.move.through.{k}.0"), message));
+            }
+            before = *share;
+        }
     }
     let mut along = [Along::Held; 2];
     for (i, step) in case.steps.iter().enumerate() {

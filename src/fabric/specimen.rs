@@ -52,8 +52,8 @@ fn piece(case: &Case, fabric: &Fabric, path: &str, [warps, wefts, threads]: [&Cu
     let lines = |columns: usize, cut: &Cut, pitch: f64| {
         (columns + 1) as f64 * (resolution.layers + 1) as f64 * 4.0 * cut.half[0] * cut.half[1] / pitch
     };
-    let nodes = lines(resolution.warp_columns, warps, layout.pitch[0])
-        + lines(resolution.weft_columns, wefts, layout.pitch[1]);
+    let nodes =
+        lines(resolution.warp_columns, warps, layout.pitch[0]) + lines(resolution.weft_columns, wefts, layout.pitch[1]);
     let nodes = nodes / resolution.slice_mm;
     require(nodes <= MOST_NODES, "resolution", || {
         format!("asks for {nodes:.1e} nodes, more than {MOST_NODES:.0e}; coarsen it or choose a smaller specimen")

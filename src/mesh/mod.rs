@@ -12,9 +12,9 @@ pub mod frame;
 pub mod linking;
 pub mod quality;
 pub mod report;
-pub mod solid;
 #[cfg(test)]
 pub(crate) mod sample;
+pub mod solid;
 pub mod surface;
 pub mod vector;
 

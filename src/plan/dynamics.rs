@@ -94,7 +94,8 @@ impl Held {
         let arcs = (!t.conditions.arcs.is_empty()).then(|| b.table("prescribed arcs", t.conditions.arcs.clone()));
         let (reaction, work) = (b.scratch("reactions", 3 * count), b.scratch("work of reactions", count));
         let &Nodes { velocity, mass, acceleration, inverse_mass, .. } = nodes;
-        let wires = wires![nodes: at, targets, arcs, velocity, mass, acceleration, inverse_mass, work, reactions: reaction];
+        let wires =
+            wires![nodes: at, targets, arcs, velocity, mass, acceleration, inverse_mass, work, reactions: reaction];
         let params = prescribed::Params { first_thread: nodes.first_thread as u32 };
         let kernel = flagged!(Prescribed; t.active.damping, arcs.is_some());
         let stage = Stage::new("prescribed", kernel, (count, NODE_GRAIN), &wires, params);

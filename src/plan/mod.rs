@@ -47,8 +47,8 @@ use nodes::{Nodes, Searched};
 use solids::Solids;
 use std::borrow::Cow;
 use threads::Threads;
-use tools::Tools;
 pub use tools::ToolBuffers;
+use tools::Tools;
 pub use totals::{Largest, Sums, Totals};
 
 /// The plan of a scene.

@@ -124,7 +124,9 @@ impl Model {
             let works = [nodes.work, p.held.as_ref().map(|held| held.work), p.tools().map(|tools| tools.buffers.works)];
             let taken = |buffer| works.contains(&Some(buffer));
             let of_tools = |buffer: &Buffer| works[2] == Some(*buffer);
-            stage.reads.iter().any(of_tools) || stage.reads.contains(&nodes.velocity) || stage.writes.iter().any(|(buffer, _)| taken(*buffer))
+            stage.reads.iter().any(of_tools)
+                || stage.reads.contains(&nodes.velocity)
+                || stage.writes.iter().any(|(buffer, _)| taken(*buffer))
         };
         let collect_motion = plan.collect.iter().filter(sees_motion).cloned().collect();
         let mut hex_at = vec![0; tables.solids.headers.len() * LANES];

@@ -87,7 +87,13 @@ pub(super) fn yarn(yarn: &Yarn, size: [f64; 3], [slices, columns, layers]: [usiz
 
 /// A grip on all components of some nodes, which moves by a distance along x.
 pub(super) fn grip(name: &str, nodes: Vec<usize>, displacement: f64) -> Motion {
-    Motion { name: name.into(), nodes, components: [true; 3], displacement: [displacement, 0.0, 0.0], ..Motion::default() }
+    Motion {
+        name: name.into(),
+        nodes,
+        components: [true; 3],
+        displacement: [displacement, 0.0, 0.0],
+        ..Motion::default()
+    }
 }
 
 /// Refuses load steps that only a piece of fabric has, and a pull, given at a path of the case, that moves nothing.

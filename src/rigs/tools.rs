@@ -4,9 +4,9 @@ use crate::case::Case;
 use crate::case::check::distinct;
 use crate::case::provenance::Provenance;
 use crate::error::{Error, Result};
+use crate::mesh::Mesh;
 use crate::mesh::centre::REACH;
 use crate::mesh::solid::{self, Triangle};
-use crate::mesh::Mesh;
 use crate::settings::steps::Step;
 use crate::settings::tool::{Shape, Tool};
 use serde_json::{Value, json};
@@ -51,7 +51,9 @@ pub(super) fn check(case: &Case, tools: &[Tool], path: &str, provenance: &Proven
 fn motion(tool: &Tool, at: &dyn Fn(&str) -> String, provenance: &Provenance) -> Result<()> {
     let Some(free) = &tool.free else { return Ok(()) };
     if free.axes == [false; 3] {
-        return Err(provenance.error(&at("free.axes"), "all false: the tool is free along no axis, set one or remove free"));
+        return Err(
+            provenance.error(&at("free.axes"), "all false: the tool is free along no axis, set one or remove free")
+        );
     }
     for k in 0..3 {
         if free.axes[k] && tool.displacement_mm[k] != 0.0 {

@@ -48,13 +48,18 @@ pub enum Step {
         #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,
     },
-    /// The prescribed displacements of a specimen's clamp, or of the conditions of an inline mesh, change to a share of their
-    /// full value.
+    /// The prescribed displacements of clamps, conditions and tools, and the forces on tools, change to a share of their full
+    /// value.
     Move {
         /// Share of the full value at the end, −1 to 1. Default 1.
         #[serde(default = "whole")]
         #[schemars(range(min = -1, max = 1))]
         to: f64,
+        /// Amplitudes on the way, `[[share of the duration, share of the full value], …]`: a smooth curve leads through them
+        /// and turns at each extreme. Default none.
+        #[serde(default)]
+        #[schemars(inner(inner(range(min = -1, max = 1))))]
+        through: Vec<[f64; 2]>,
         /// Duration, s.
         #[schemars(range(min = 1e-9, max = 10))]
         time_s: f64,

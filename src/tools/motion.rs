@@ -49,11 +49,7 @@ pub struct Motion;
 
 impl Kernel for Motion {
     const SHADER: Shader = Shader {
-        constants: &[
-            &position::CONSTANTS,
-            &constants![uint: SEAT, MOVED, MOTION, NOTES, STIFFNESS],
-            &CONSTANTS,
-        ],
+        constants: &[&position::CONSTANTS, &constants![uint: SEAT, MOVED, MOTION, NOTES, STIFFNESS], &CONSTANTS],
         ..Shader::new("tools/motion", "march")
     };
     const SLOTS: &'static [Slot] = &[

@@ -83,7 +83,13 @@ impl<R: Real> Shapes<'_, R> {
                 return None;
             }
             let near = (cells - R::from_f64(0.5)).to_i32();
-            low[k] = if near < 0 { 0 } else if near > last { last } else { near };
+            low[k] = if near < 0 {
+                0
+            } else if near > last {
+                last
+            } else {
+                near
+            };
             part[k] = cells - R::from_i32(low[k]);
         }
         let (row, layer) = (seat[COUNTS], seat[COUNTS] * seat[COUNTS + 1]);

@@ -5,11 +5,11 @@
 
 use super::shape::{self, MOTION, MOVED, RUBS, SEAT, Shapes, TOOL, steepness};
 use crate::contact::friction::slide;
+use crate::contact::joint::{Joint, quanta};
 use crate::contact::memory::{DAMPED, ELASTIC, NORMAL, touch};
 use crate::contact::rub::viscosity;
 use crate::contact::sums::{self, SUM_DAMPING, SUM_ENERGY, SUM_FRICTION, SUM_RADIUS, SUM_SLIP};
 use crate::contact::surface::{self, CARRIED, POINT, Surface, of_coded};
-use crate::contact::joint::{Joint, quanta};
 use crate::contact::{Params, is_in_range, status};
 use crate::kernel::buffer::Kind::{Int, Scalar, Uint};
 use crate::kernel::interface::{Constant, Slot, constants, slot};
@@ -40,9 +40,7 @@ const fn shared(kind: usize, friction: bool) -> [Constant; 5] {
 /// Forces between points of threads (`THREAD`) or of yarn surfaces and tools.
 pub struct Touch<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool>;
 
-impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel
-    for Touch<THREAD, FRICTION, PERIODIC>
-{
+impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Kernel for Touch<THREAD, FRICTION, PERIODIC> {
     const SHADER: Shader = Shader {
         defines: &[when(THREAD, "THREAD"), when(FRICTION, "FRICTION"), when(PERIODIC, "PERIODIC")],
         constants: &[
@@ -94,15 +92,12 @@ const fn kind(threads: bool) -> usize {
     if threads { 0 } else { 1 }
 }
 
-impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool>
-    Touch<THREAD, FRICTION, PERIODIC>
-{
+impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Touch<THREAD, FRICTION, PERIODIC> {
     /// Forces of all tools on points carried by `N` nodes.
     #[inline(always)]
     fn press<R: Real, const N: usize>(io: &Io<R>, items: Range<usize>) {
         let real = |x: f32| R::from_f64(f64::from(x));
-        let (zero, half, one, two) =
-            (R::from_f64(0.0), R::from_f64(0.5), R::from_f64(1.0), R::from_f64(2.0));
+        let (zero, half, one, two) = (R::from_f64(0.0), R::from_f64(0.5), R::from_f64(1.0), R::from_f64(2.0));
         let params: Params = io.params();
         let row = io.row;
         let elapsed = row.dt_mid + row.dt_mid - row.dt;

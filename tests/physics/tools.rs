@@ -50,11 +50,10 @@ fn a_plate_presses_with_its_penalty() {
     // half of the upper layer of both sides counts
     let area = 2.0 * (1.0 + 2.0 * 0.25);
     for precision in [F32, F64] {
-        let plate = json!({ "name": "plate", "shape": "plane", "turned_deg": [180, 0, 0], "displacement_mm": [0, 0, -DEPTH] });
-        let case = with(
-            scene(100.0, held(0.0), plate, moves(1e-3)),
-            &[("/effects/contact", json!({ "damping_ratio": 0 }))],
-        );
+        let plate =
+            json!({ "name": "plate", "shape": "plane", "turned_deg": [180, 0, 0], "displacement_mm": [0, 0, -DEPTH] });
+        let case =
+            with(scene(100.0, held(0.0), plate, moves(1e-3)), &[("/effects/contact", json!({ "damping_ratio": 0 }))]);
         let s = run(&case, precision, 1e-3);
         let tool = s.tools()[0];
         near("displacement, mm", tool.displacement[2], -DEPTH, 1e-5);
@@ -210,7 +209,8 @@ fn force(shape: Value, at: [f64; 3], by: f64) -> [f64; 3] {
 fn shapes_of_triangles_press_as_the_shapes_that_they_are() {
     let size = [1.4, 0.7, 1.0];
     let own = force(json!({ "box": { "size_mm": size, "edge_radius_mm": 0 } }), [0.05, 0.0, 0.505], 0.02);
-    let same = force(json!({ "mesh": { "triangles_mm": box_of_triangles(size), "cell_mm": 0.05 } }), [0.05, 0.0, 0.505], 0.02);
+    let same =
+        force(json!({ "mesh": { "triangles_mm": box_of_triangles(size), "cell_mm": 0.05 } }), [0.05, 0.0, 0.505], 0.02);
     near("force of a box, N", same[2], own[2], 1e-4);
 
     let radius = 2.0;
@@ -241,7 +241,11 @@ fn a_grid_has_the_distances_of_its_surface() {
                 let exact = if outside > 0.0 { outside } else { beyond.into_iter().fold(f64::NEG_INFINITY, f64::max) };
                 // on the surface the sign is that of rounding
                 let limited = exact.clamp(-0.75, 0.75);
-                assert!((grid.distances[index] - limited).abs() < 1e-9 || exact.abs() < 1e-9, "{at:?}: {}", grid.distances[index]);
+                assert!(
+                    (grid.distances[index] - limited).abs() < 1e-9 || exact.abs() < 1e-9,
+                    "{at:?}: {}",
+                    grid.distances[index]
+                );
                 index += 1;
             }
         }

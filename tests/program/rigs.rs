@@ -51,16 +51,21 @@ fn plates_press_a_cell_from_both_sides() {
         };
         let (folder, summary) = ran("cell_compaction", &[steps, "domain.cell_compaction.thickness_mm=0.7"], precision);
         let plates = table(&folder, "plates.csv");
-        let [upper, lower] = ["upper", "lower"].map(|plate| *plates.numbers(&format!("{plate}_pressure_mpa")).last().unwrap());
+        let [upper, lower] =
+            ["upper", "lower"].map(|plate| *plates.numbers(&format!("{plate}_pressure_mpa")).last().unwrap());
         println!("{precision:?}, {angle}°: {upper} and {lower} MPa");
         assert!(upper > 0.02 && (upper - lower).abs() < 0.02 * upper, "{upper} {lower}");
         let compaction = &summary["compaction"];
         assert!((compaction["thickness_mm"].as_f64().unwrap() - 0.7).abs() < 1e-4);
         // two plies of 300 g/m² of fibres of 1.8 g/cm³, on less ground when sheared
         let share = 2.0 * 300e-6 / 1.8e-3 / 0.7 / f64::to_radians(angle).cos();
-        let stretch = [&summary["fibres"]["warp"], &summary["fibres"]["weft"]].map(|ply| ply["stretch"].as_f64().unwrap());
+        let stretch =
+            [&summary["fibres"]["warp"], &summary["fibres"]["weft"]].map(|ply| ply["stretch"].as_f64().unwrap());
         let share = share / (stretch[0] * stretch[1]);
-        assert!((compaction["fibre_volume_fraction"].as_f64().unwrap() / share - 1.0).abs() < 1e-3, "{compaction} {share}");
+        assert!(
+            (compaction["fibre_volume_fraction"].as_f64().unwrap() / share - 1.0).abs() < 1e-3,
+            "{compaction} {share}"
+        );
     }
 }
 
@@ -100,7 +105,8 @@ fn the_edges_bear_what_pulls_the_yarn_out() {
         let (folder, summary) = ran("pull_out", &sets, precision);
         let reactions = table(&folder, "reactions.csv");
         let (names, force) = (reactions.texts("condition"), reactions.numbers("force_x_n"));
-        let last = |name: &str| names.iter().zip(&force).filter(|(n, _)| **n == name).map(|(_, f)| *f).next_back().unwrap();
+        let last =
+            |name: &str| names.iter().zip(&force).filter(|(n, _)| **n == name).map(|(_, f)| *f).next_back().unwrap();
         let (pulled, held) = (last("pulled yarn"), last("held edges"));
         println!("{ply} {precision:?}: {pulled} N pulled, {held} N held; {}", summary["pull_out"]);
         assert!(pulled > 0.01 && (pulled + held).abs() < 0.03 * pulled, "{pulled} {held}");

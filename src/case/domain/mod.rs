@@ -7,7 +7,9 @@ mod resolution;
 
 pub use constituents::{Cantilever, OnePly, Sides, ThreadTension, YarnCompaction, YarnShear};
 pub use inline::{Condition, InlineBlock, InlineMesh, InlineThread};
-pub use pieces::{Cell, CellCompaction, Clamps, FrameClamps, PictureFrame, PullOut, Specimen, ThreadEnds, ToolFriction};
+pub use pieces::{
+    Cell, CellCompaction, Clamps, FrameClamps, PictureFrame, PullOut, Specimen, ThreadEnds, ToolFriction,
+};
 pub use resolution::Resolution;
 
 use schemars::JsonSchema;

@@ -9,8 +9,8 @@ pub(super) use observer::Sheared;
 pub(super) use page::curves;
 pub use page::tension;
 
-use super::observer::{Observer, Tables};
 use super::check::steps;
+use super::observer::{Observer, Tables};
 use super::{Piece, Rig, crossings};
 use crate::case::Case;
 use crate::case::domain::Cell;

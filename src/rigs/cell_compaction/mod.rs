@@ -56,10 +56,8 @@ impl Rig for CellCompaction {
             );
             return Err(Error::case("domain.cell_compaction.thickness_mm", message));
         }
-        mesh.tools = vec![
-            plate("lower plate", low - CLEARANCE, 0.0, way),
-            plate("upper plate", high + CLEARANCE, 180.0, -way),
-        ];
+        mesh.tools =
+            vec![plate("lower plate", low - CLEARANCE, 0.0, way), plate("upper plate", high + CLEARANCE, 180.0, -way)];
         Ok(Piece { mesh, ..Piece::default() })
     }
 

@@ -133,7 +133,13 @@ mod tests {
         let base =
             r#""name": "b", "density_t_mm3": 1e-9, "material": { "neo_hookean": { "young_mpa": 1, "poisson": 0.3 } }"#;
         let block = serde_json::from_str(&format!("{{ {base}, {json} }}")).unwrap();
-        build(&InlineMesh { blocks: vec![block], threads: vec![], friction: Friction::default(), conditions: vec![], tools: vec![] })
+        build(&InlineMesh {
+            blocks: vec![block],
+            threads: vec![],
+            friction: Friction::default(),
+            conditions: vec![],
+            tools: vec![],
+        })
     }
 
     #[test]

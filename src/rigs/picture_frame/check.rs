@@ -15,7 +15,9 @@ pub fn check(case: &Case, frame: &PictureFrame, provenance: &Provenance) -> Resu
     let stretches = frame.tension_strain > 0.0;
     steps(case, provenance, |step| match step {
         Step::Stretch { .. } => Some("only a cell has a stretch of its own: give domain.picture_frame.tension_strain"),
-        Step::Move { .. } if !stretches => Some("nothing to move: give domain.picture_frame.tension_strain, or use shear"),
+        Step::Move { .. } if !stretches => {
+            Some("nothing to move: give domain.picture_frame.tension_strain, or use shear")
+        }
         Step::Move { to, .. } if *to != 1.0 => Some("the frame turns with whole tension only: move to 1"),
         _ => None,
     })?;
@@ -26,7 +28,8 @@ pub fn check(case: &Case, frame: &PictureFrame, provenance: &Provenance) -> Resu
         return Err(provenance.error("domain.picture_frame.tension_strain", message));
     }
     if frame.fabric_mm > frame.frame_mm {
-        let message = format!("{} mm does not fit the frame of {} mm: give at most that", frame.fabric_mm, frame.frame_mm);
+        let message =
+            format!("{} mm does not fit the frame of {} mm: give at most that", frame.fabric_mm, frame.frame_mm);
         return Err(provenance.error("domain.picture_frame.fabric_mm", message));
     }
     let pitch = fabric.warp.pitch_mm.max(fabric.weft.pitch_mm);

@@ -47,7 +47,9 @@ impl PictureFrame {
                 FrameClamps::Glued => 0..=block.columns,
             };
             let lines = (0..=block.layers).flat_map(|layer| columns.clone().map(move |column| (column, layer)));
-            lines.flat_map(|(column, layer)| (0..block.stations()).map(move |i| block.line(column, layer) + i)).collect()
+            lines
+                .flat_map(|(column, layer)| (0..block.stations()).map(move |i| block.line(column, layer) + i))
+                .collect()
         };
         let mut nodes: Vec<usize> = yarns.flat_map(held).filter(at_end).collect();
         nodes.sort_unstable();
@@ -63,7 +65,11 @@ impl PictureFrame {
             displacement[along] = clamp.2 * 0.5 * self.frame_mm * self.tension_strain;
             let arc = |node: &usize| {
                 let [mut x, mut y, _] = mesh.nodes[*node];
-                if along == 0 { x += displacement[0] } else { y += displacement[1] };
+                if along == 0 {
+                    x += displacement[0]
+                } else {
+                    y += displacement[1]
+                };
                 [[x, y, 0.0], [y, x, 0.0]]
             };
             let arcs = nodes.iter().map(arc).collect();

@@ -37,7 +37,8 @@ impl Framed {
     pub(super) fn of(frame: &PictureFrame, simulation: &Simulation, tables: &Tables) -> Result<Self> {
         let mesh = simulation.mesh();
         let prescribed = simulation.prescribed_nodes();
-        let places = |clamp| frame.clamped(mesh, clamp).iter().filter_map(|n| prescribed.binary_search(n).ok()).collect();
+        let places =
+            |clamp| frame.clamped(mesh, clamp).iter().filter_map(|n| prescribed.binary_search(n).ok()).collect();
         Ok(Self {
             frame: frame.clone(),
             crossings: Crossed::of(mesh, DVec2::ONE, None, tables)?,

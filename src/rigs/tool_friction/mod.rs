@@ -62,7 +62,8 @@ impl Rig for ToolFriction {
             _ => None,
         })?;
         if case.effects.contact.as_ref().is_none_or(|contact| !contact.friction) {
-            let message = "there is no friction, since effects.contact or effects.contact.friction turns it off: turn it on";
+            let message =
+                "there is no friction, since effects.contact or effects.contact.friction turns it off: turn it on";
             return Err(provenance.error("domain.tool_friction.coefficient", message));
         }
         if case.steps.iter().all(|step| !matches!(step, Step::Move { .. })) {
@@ -75,7 +76,8 @@ impl Rig for ToolFriction {
         let mut mesh = specimen::build(case, case.fabric()?, &self.specimen())?;
         self.plates(&mut mesh)?;
         let yarns = mesh.first_thread_node();
-        let nodes: Vec<usize> = clamped(&self.specimen(), &mesh).concat().into_iter().filter(|node| *node < yarns).collect();
+        let nodes: Vec<usize> =
+            clamped(&self.specimen(), &mesh).concat().into_iter().filter(|node| *node < yarns).collect();
         let ties = ties(&mesh, nodes.clone());
         let held = Motion { name: "clamps".into(), nodes, components: [true, true, false], ..Motion::default() };
         Ok(Piece { mesh, motions: vec![held], ties })

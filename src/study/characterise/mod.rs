@@ -171,7 +171,8 @@ impl Done {
             }
             Curve::Compaction => {
                 let [thickness, share] = compacted(folder)?;
-                for (name, unit, points) in [("thickness", "mm", &thickness), ("fibre volume fraction", "–", &share)] {
+                for (name, unit, points) in [("thickness", "mm", &thickness), ("fibre volume fraction", "–", &share)]
+                {
                     if points.last().is_some_and(|[end, _]| *end >= PRESSURE) {
                         numbers.push(given(format!("{name} at {PRESSURE} MPa"), unit, value(points, PRESSURE)));
                     }
