@@ -23,6 +23,20 @@ pub fn steps(case: &Case, provenance: &Provenance, refused: impl Fn(&Step) -> Op
     Ok(())
 }
 
+/// Refuses sides of a piece, given by their JSON paths, that hold fewer than so many yarns of a ply.
+pub fn pitches(fabric: &Fabric, fewest: f64, sides: &[(&str, f64)], provenance: &Provenance) -> Result<()> {
+    let pitch = fabric.warp.pitch_mm.max(fabric.weft.pitch_mm);
+    match sides.iter().find(|(_, length)| *length < fewest * pitch) {
+        Some((path, length)) => {
+            let least = fewest * pitch;
+            let message =
+                format!("{length} holds less than {fewest} yarns at a pitch of {pitch} mm: give at least {least} mm");
+            Err(provenance.error(path, message))
+        }
+        None => Ok(()),
+    }
+}
+
 /// The fabric of a case; `what` names the domain in errors.
 pub fn fabric<'a>(case: &'a Case, what: &str, provenance: &Provenance) -> Result<&'a Fabric> {
     let Some(FabricSource::Inline(fabric)) = &case.fabric else {

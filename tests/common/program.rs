@@ -1,11 +1,15 @@
 //! Runs the program on a case in a folder, and reads its results.
 
+use super::options;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};
 use std::time::Duration;
 use tempfile::TempDir;
+use tricot::rigs::read::read;
+use tricot::run::{Options, run};
+use tricot::settings::integration::Precision;
 
 /// A folder that holds a case as `case.json`.
 pub fn folder(case: &Value) -> TempDir {
@@ -63,6 +67,21 @@ fn results(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 /// `summary.json` of a run.
 pub fn summary(dir: &Path) -> Value {
     serde_json::from_slice(&fs::read(dir.join("summary.json")).unwrap()).unwrap()
+}
+
+/// The folder, with the run in `run`, and the summary of a shipped case with changes, whose energies balance to 2 %.
+#[track_caller]
+pub fn balanced(case: &str, sets: &[&str], precision: Precision) -> (TempDir, Value) {
+    let folder = tempfile::tempdir().unwrap();
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+    let loaded = read(Path::new(&format!("cases/{case}.json")), &sets).unwrap_or_else(|e| panic!("{e}"));
+    let options = Options { precision: Some(precision), ..options(folder.path().join("run"), 1) };
+    run(&loaded, &options).unwrap_or_else(|e| panic!("{e}"));
+    let summary = summary(&folder.path().join("run"));
+    let balance = summary["worst_energy_balance"].as_f64().unwrap();
+    println!("{case} {precision:?}: balance {balance:.2e}");
+    assert!(balance < 0.02, "{case}: balance {balance}");
+    (folder, summary)
 }
 
 /// The hash of the state at the end of a run.

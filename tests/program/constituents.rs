@@ -1,24 +1,12 @@
 //! Tests of the constituents: the program evaluates them as an experimenter would, and recovers what was put in.
 
-use crate::common::options;
+use crate::common::program::balanced;
 use serde_json::{Value, json};
-use std::fs;
-use std::path::Path;
-use tricot::rigs::read::read;
-use tricot::run::{Options, run};
 use tricot::settings::integration::Precision;
 
 /// The summary of a shipped case with changes, in a precision.
 fn summary(case: &str, sets: &[&str], precision: Precision) -> Value {
-    let folder = tempfile::tempdir().unwrap();
-    let sets: Vec<String> = sets.iter().chain(&["output.pictures=false"]).map(|set| set.to_string()).collect();
-    let loaded = read(Path::new(&format!("cases/{case}.json")), &sets).unwrap_or_else(|e| panic!("{e}"));
-    let options = Options { precision: Some(precision), ..options(folder.path().join("run"), 1) };
-    run(&loaded, &options).unwrap_or_else(|e| panic!("{e}"));
-    let text = fs::read_to_string(folder.path().join("run/summary.json")).unwrap();
-    let summary: Value = serde_json::from_str(&text).unwrap();
-    let balance = summary["worst_energy_balance"].as_f64().unwrap();
-    assert!(balance < 0.02, "{case}: balance {balance}");
+    let (_, summary) = balanced(case, &[sets, &["output.pictures=false"]].concat(), precision);
     println!("{case} {sets:?} {precision:?}: {}", summary["property"]);
     summary
 }

@@ -1,13 +1,9 @@
 //! Rigs of the fabric: balances that hold whatever the fabric does, in both precisions.
 
-use crate::common::options;
+use crate::common::program::balanced;
 use serde_json::Value;
-use std::fs;
-use std::path::Path;
 use tempfile::TempDir;
 use tricot::output::columns::Columns;
-use tricot::rigs::read::read;
-use tricot::run::{Options, run};
 use tricot::settings::integration::Precision::{self, F32, F64};
 
 /// A coarse mesh of every rig, and quick load steps.
@@ -19,17 +15,7 @@ const COARSE: [&str; 3] = [
 
 /// The folder and the summary of a shipped case with changes.
 fn ran(case: &str, sets: &[&str], precision: Precision) -> (TempDir, Value) {
-    let folder = tempfile::tempdir().unwrap();
-    let sets: Vec<String> = COARSE.iter().chain(sets).map(|set| set.to_string()).collect();
-    let loaded = read(Path::new(&format!("cases/{case}.json")), &sets).unwrap_or_else(|e| panic!("{e}"));
-    let options = Options { precision: Some(precision), ..options(folder.path().join("run"), 1) };
-    run(&loaded, &options).unwrap_or_else(|e| panic!("{e}"));
-    let text = fs::read_to_string(folder.path().join("run/summary.json")).unwrap();
-    let summary: Value = serde_json::from_str(&text).unwrap();
-    let balance = summary["worst_energy_balance"].as_f64().unwrap();
-    println!("{case} {precision:?}: balance {balance:.2e}");
-    assert!(balance < 0.02, "{case}: balance {balance}");
-    (folder, summary)
+    balanced(case, &[&COARSE[..], sets].concat(), precision)
 }
 
 fn table(folder: &TempDir, name: &str) -> Columns {

@@ -5,7 +5,7 @@ use crate::case::domain::{Clamps, Specimen};
 use crate::case::fabric::Fabric;
 use crate::case::provenance::Provenance;
 use crate::error::Result;
-use crate::rigs::check::{MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM, fabric, steps};
+use crate::rigs::check::{MAX_BEAMS, MAX_HEXES, MAX_POSITION_MM, fabric, pitches, steps};
 use crate::settings::steps::Step;
 
 /// Smallest number of pitches of each ply along each side.
@@ -50,16 +50,8 @@ fn size(case: &Case, specimen: &Specimen, fabric: &Fabric, provenance: &Provenan
             format!("{} is too wide, at most {} mm: use a smaller one", specimen.width_mm, 2.0 * MAX_POSITION_MM);
         return Err(provenance.error("domain.specimen.width_mm", message));
     }
-    let pitch = fabric.warp.pitch_mm.max(fabric.weft.pitch_mm);
-    for (name, length) in [("length_mm", specimen.length_mm), ("width_mm", specimen.width_mm)] {
-        if length < FEWEST_PITCHES * pitch {
-            let message = format!(
-                "{length} holds less than {FEWEST_PITCHES} yarns at a pitch of {pitch} mm: give at least {} mm",
-                FEWEST_PITCHES * pitch
-            );
-            return Err(provenance.error(&format!("domain.specimen.{name}"), message));
-        }
-    }
+    let sides = [("domain.specimen.length_mm", specimen.length_mm), ("domain.specimen.width_mm", specimen.width_mm)];
+    pitches(fabric, FEWEST_PITCHES, &sides, provenance)?;
     let resolution = &case.resolution.refined();
     let shortest = specimen.length_mm.min(specimen.width_mm);
     if 3.0 * resolution.slice_mm > shortest {

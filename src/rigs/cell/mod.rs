@@ -6,8 +6,8 @@ mod page;
 
 pub(super) use check::check;
 pub(super) use observer::Sheared;
-pub(super) use page::curves;
 pub use page::tension;
+pub(super) use page::{curves, effective_angles};
 
 use super::check::steps;
 use super::observer::{Observer, Tables};

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::output::chart::{self, Curve};
 use crate::output::columns::Columns;
 use crate::output::page::Page;
-use crate::output::results::Results;
+use crate::output::results::{Axis, Results};
 
 /// Membrane force along the fibres of a ply, N/mm, over their strain, %, in every row.
 pub fn tension(stress: &Columns, ply: &str) -> Vec<[f64; 2]> {
@@ -26,6 +26,17 @@ fn tensions(results: &Results, stress: &Columns, page: &mut Page) {
     }
 }
 
+/// The shear at the crossings.
+pub(in crate::rigs) fn effective_angles(results: &Results, shear: &Columns, axis: &Axis, page: &mut Page) {
+    let angles = [
+        ("effective_angle_mean_deg", "mean"),
+        ("effective_angle_min_deg", "smallest"),
+        ("effective_angle_max_deg", "largest"),
+    ];
+    let caption = "Between the mid-lines at the crossings of warp and weft.";
+    results.chart(page, shear, axis, ["Effective shear angle", "degrees"], &angles, caption);
+}
+
 pub(in crate::rigs) fn curves(results: &Results, page: &mut Page) -> Result<()> {
     let (axis, history) = (results.axis(), &results.history);
     if axis.is_angle() {
@@ -41,13 +52,7 @@ pub(in crate::rigs) fn curves(results: &Results, page: &mut Page) -> Result<()> 
         tensions(results, &stress, page);
     }
     if let Some(shear) = results.other("shear.csv")? {
-        let angles = [
-            ("effective_angle_mean_deg", "mean"),
-            ("effective_angle_min_deg", "smallest"),
-            ("effective_angle_max_deg", "largest"),
-        ];
-        let caption = "Between the mid-lines at the crossings of warp and weft.";
-        results.chart(page, &shear, &axis, ["Effective shear angle", "degrees"], &angles, caption);
+        effective_angles(results, &shear, &axis, page);
         let slips = [("slip_mean_mm", "mean"), ("slip_max_mm", "largest")];
         let caption = "Between the material points of both yarns at a crossing.";
         results.chart(page, &shear, &axis, ["Slip of the plies", "mm"], &slips, caption);

@@ -4,7 +4,7 @@ use crate::case::Case;
 use crate::case::domain::PictureFrame;
 use crate::case::provenance::Provenance;
 use crate::error::Result;
-use crate::rigs::check::{fabric, steps};
+use crate::rigs::check::{fabric, pitches, steps};
 use crate::settings::steps::Step;
 
 /// Smallest number of pitches of each ply along the square.
@@ -32,14 +32,5 @@ pub fn check(case: &Case, frame: &PictureFrame, provenance: &Provenance) -> Resu
             format!("{} mm does not fit the frame of {} mm: give at most that", frame.fabric_mm, frame.frame_mm);
         return Err(provenance.error("domain.picture_frame.fabric_mm", message));
     }
-    let pitch = fabric.warp.pitch_mm.max(fabric.weft.pitch_mm);
-    if frame.fabric_mm < FEWEST_PITCHES * pitch {
-        let message = format!(
-            "{} mm holds less than {FEWEST_PITCHES} yarns at a pitch of {pitch} mm: give at least {} mm",
-            frame.fabric_mm,
-            FEWEST_PITCHES * pitch
-        );
-        return Err(provenance.error("domain.picture_frame.fabric_mm", message));
-    }
-    Ok(())
+    pitches(fabric, FEWEST_PITCHES, &[("domain.picture_frame.fabric_mm", frame.fabric_mm)], provenance)
 }

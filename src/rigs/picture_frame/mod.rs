@@ -7,6 +7,7 @@
 mod check;
 mod observer;
 
+use super::cell::effective_angles;
 use super::observer::{Observer, Tables};
 use super::ties::ties;
 use super::{Piece, Rig, crossings};
@@ -110,13 +111,7 @@ impl Rig for PictureFrame {
             results.chart(page, &frame, &OVER_ANGLE, ["Tension", "N/mm"], &tension, caption);
         }
         if let Some(shear) = results.other("shear.csv")? {
-            let angles = [
-                ("effective_angle_mean_deg", "mean"),
-                ("effective_angle_min_deg", "smallest"),
-                ("effective_angle_max_deg", "largest"),
-            ];
-            let caption = "Between the mid-lines at the crossings of warp and weft.";
-            results.chart(page, &shear, &OVER_ANGLE, ["Effective shear angle", "degrees"], &angles, caption);
+            effective_angles(results, &shear, &OVER_ANGLE, page);
         }
         Ok(())
     }

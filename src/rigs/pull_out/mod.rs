@@ -3,7 +3,7 @@
 
 mod observer;
 
-use super::check::{fabric, steps};
+use super::check::{fabric, pitches, steps};
 use super::constituents::force;
 use super::observer::{Observer, Tables};
 use super::ties::ties;
@@ -81,17 +81,8 @@ impl Rig for PullOut {
             let message = "is never applied: add a move step";
             return Err(provenance.error("domain.pull_out.displacement_mm", message));
         }
-        let pitch = fabric.warp.pitch_mm.max(fabric.weft.pitch_mm);
-        for (name, length) in [("length_mm", self.length_mm), ("width_mm", self.width_mm)] {
-            if length < FEWEST_PITCHES * pitch {
-                let message = format!(
-                    "{length} holds less than {FEWEST_PITCHES} yarns at a pitch of {pitch} mm: give at least {} mm",
-                    FEWEST_PITCHES * pitch
-                );
-                return Err(provenance.error(&format!("domain.pull_out.{name}"), message));
-            }
-        }
-        Ok(())
+        let sides = [("domain.pull_out.length_mm", self.length_mm), ("domain.pull_out.width_mm", self.width_mm)];
+        pitches(fabric, FEWEST_PITCHES, &sides, provenance)
     }
 
     fn piece(&self, case: &Case) -> Result<Piece> {
