@@ -37,8 +37,8 @@
 //! |---|---|
 //! | [`error`] | the one error type: every message names its culprit |
 //! | [`kernel`] | shared by all backends: lanes and pairs of registers, elementary functions, positions in quanta, buffers, work space, kernel interfaces, stages, the text of shaders |
-//! | [`settings`] | effects, load steps, integration, laws: plain structs with their JSON form |
-//! | [`mesh`] | nodes, blocks of hexahedra, threads, frames (deformed states), surfaces, quality |
+//! | [`settings`] | effects, load steps, integration, laws, tools: plain structs with their JSON form |
+//! | [`mesh`] | nodes, blocks of hexahedra, threads, frames (deformed states), surfaces, closed solids, quality |
 //! | [`materials`] | constitutive laws: energy, first Piola–Kirchhoff stress, stiffness |
 //! | [`elements`] | hexahedra, beams, bending between beams |
 //! | [`contact`] | search and forces: points on closed surfaces, lines on lines, friction |
@@ -54,7 +54,7 @@
 //! | [`case`] | user input: typed JSON with units, ranges, defaults, schema and overrides |
 //! | [`fabric`] | geometry from the parameters of a fabric: yarn sections, the path of the stitch, a cell, a cut piece |
 //! | [`output`] | frames, tables, maps, pictures, pages, checkpoints |
-//! | [`rigs`] | test rigs: cell, bias extension, thread, yarn, inline mesh; what each checks, builds, measures and reports |
+//! | [`rigs`] | test rigs: cell, bias extension, picture frame, compaction, pull-out, friction, thread, yarn, inline mesh; what each checks, builds, measures and reports |
 //! | [`run`] | a case with its files, as the program runs it |
 //! | [`study`] | many runs at once: the tests of a fabric, tables over a folder of scenes, how results differ, what accuracy costs |
 //!
@@ -93,6 +93,7 @@
 //! - **A buffer or a constant of a kernel**: a slot among its `SLOTS`, which the plan binds by name, or a constant among those of its
 //!   shader. The twin gets both from there, see [`kernel::interface`].
 //! - **A contact law**: beside `contact::friction`; it sees one pair with its state and returns a force.
+//! - **A shape of tools**: its distance in [`tools::shape`] and its twin, its numbers in `plan::tools`, its JSON in [`settings::tool::Shape`].
 //! - **An effect**: a flag in [`plan::Active`] that says what in a case calls for it, a const flag of the kernels it changes and the same
 //!   name for `#if` in their twins, a name and how to turn it off in [`run::effects`], a scene with and without it in `tests/physics/effects.rs`.
 //! - **A measure**: a file in `measure`, from [`mesh::Mesh`] and [`mesh::frame::Frame`]; a column in [`output::rows`].

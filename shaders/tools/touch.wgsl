@@ -57,6 +57,9 @@ fn press(item: u32) {
 #endif
         let here = near(tool, at);
         if !here.is_there {
+            for (var i = 0u; i < TOUCH; i++) {
+                touches[memory + i] = 0.0;
+            }
             continue;
         }
         let depth = radius - here.distance;

@@ -150,15 +150,18 @@ impl<const THREAD: bool, const FRICTION: bool, const PERIODIC: bool> Touch<THREA
                 note.fill(zero);
                 let memory = &mut touches.item(0, item)[size * tool..][..size];
                 // from the origin of the tool to the point, in the reference and current states
+                let seat = &seats[SEAT * tool..][..SEAT];
                 let (mut from, mut by) = ([zero; 3], [zero; 3]);
                 for k in 0..3 {
-                    let seat = &seats[SEAT * tool..][..SEAT];
                     from[k] = R::from_i32(base[k].wrapping_sub(seat[k])) * R::from_f64(QUANTUM);
                     by[k] = difference(own[k], rest[k], seat[MOVED + k], motions[MOTION * tool + k]);
                 }
                 let affine = if PERIODIC { add(from, apply(&row.gradient, from)) } else { from };
                 let at = add(add(affine, by), offset.1);
-                let Some(near) = shapes.near(tool, at) else { continue };
+                let Some(near) = shapes.near(tool, at) else {
+                    memory.fill(zero);
+                    continue;
+                };
                 let depth = radius - near.distance;
                 if !(depth > zero) && memory[NORMAL] == zero && memory[DAMPED] == zero {
                     continue;

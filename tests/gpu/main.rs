@@ -5,6 +5,7 @@ mod common;
 
 mod cell;
 mod dispatches;
+mod numbers;
 mod scenes;
 mod shaders;
 mod stages;
