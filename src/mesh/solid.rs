@@ -1,6 +1,7 @@
 //! Closed surfaces of triangles, as the shapes of tools: checks, and signed distances on a grid.
 
 use super::vector::{Vector, add, cross, dot, norm, scale, sub};
+use crate::settings::tool::{Shape, Tool};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
 
@@ -59,6 +60,47 @@ pub fn check(triangles: &[Triangle]) -> Result<(), String> {
         ));
     }
     Ok(())
+}
+
+/// The surface of a tool at the start, for pictures; of a plane a square that reaches so far from its origin, mm.
+pub fn surface(tool: &Tool, reach: f64) -> Vec<Triangle> {
+    let local = match &tool.shape {
+        Shape::Plane => {
+            let corner = |x: f64, y: f64| [x * reach, y * reach, 0.0];
+            let [a, b, c, d] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+            vec![[a, b, c], [a, c, d]]
+        }
+        Shape::Sphere { radius_mm } => rounded([0.0; 3], *radius_mm),
+        Shape::Cylinder { radius_mm, length_mm } => rounded([0.5 * length_mm, 0.0, 0.0], *radius_mm),
+        Shape::Box { size_mm, edge_radius_mm } => rounded(size_mm.map(|s| 0.5 * s - edge_radius_mm), *edge_radius_mm),
+        Shape::Mesh { triangles_mm, .. } => triangles_mm.clone().unwrap_or_default(),
+    };
+    let axes = axes(tool.turned_deg);
+    let place = |x: Vector| (0..3).fold(tool.at_mm, |at, k| add(at, scale(axes[k], x[k])));
+    local.into_iter().map(|triangle| triangle.map(place)).collect()
+}
+
+/// A box with a core of some half sizes, all whose points within a radius belong to it: a sphere cut into octants, which are moved apart.
+fn rounded(half: Vector, radius: f64) -> Vec<Triangle> {
+    /// Parts of the sphere around an axis; an even number, so that no corner lies between two octants.
+    const AROUND: usize = 32;
+    let at = |i: usize, j: usize| {
+        let [round, up] = [i, j].map(|k| (k as f64 + 0.5) * std::f64::consts::TAU / AROUND as f64);
+        let on = [round.cos() * up.sin(), round.sin() * up.sin(), up.cos()];
+        [0, 1, 2].map(|k| radius * on[k] + half[k].copysign(on[k]))
+    };
+    let mut all = Vec::new();
+    for i in 0..AROUND {
+        for j in 0..AROUND / 2 - 1 {
+            let [a, b, c, d] = [at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)];
+            all.extend([[a, b, c], [a, c, d]]);
+        }
+        // the caps
+        let (top, bottom) = ([0.0, 0.0, half[2] + radius], [0.0, 0.0, -half[2] - radius]);
+        let last = AROUND / 2 - 1;
+        all.extend([[top, at(i, 0), at(i + 1, 0)], [bottom, at(i + 1, last), at(i, last)]]);
+    }
+    all
 }
 
 /// Lower and upper corner of the box around some triangles.

@@ -1,4 +1,4 @@
-//! Points with values as VTK XML poly data: crossing maps for ParaView.
+//! VTK XML poly data for ParaView: points with values (crossing maps) and surfaces of triangles (tools).
 
 use super::file::replace;
 use super::vtu::array;
@@ -13,23 +13,43 @@ pub fn write(points: &[[f64; 3]], fields: &[Field], path: &Path) -> Result<()> {
         return Err(Error::file(path, message));
     }
     let count = points.len();
+    let cells = Cells { tag: "Verts", corners: 1, connectivity: (0..count as i64).collect() };
+    poly(points, fields, &cells, path)
+}
+
+/// Writes triangles (corners in mm), atomically.
+pub fn write_surface(triangles: &[[[f64; 3]; 3]], path: &Path) -> Result<()> {
+    let points = triangles.as_flattened();
+    let cells = Cells { tag: "Polys", corners: 3, connectivity: (0..points.len() as i64).collect() };
+    poly(points, &[], &cells, path)
+}
+
+/// Cells of one kind: their element in the file, corners of each, and the points at the corners of all.
+struct Cells {
+    tag: &'static str,
+    corners: usize,
+    connectivity: Vec<i64>,
+}
+
+fn poly(points: &[[f64; 3]], fields: &[Field], cells: &Cells, path: &Path) -> Result<()> {
+    let Cells { tag, corners, connectivity } = cells;
+    let (count, number) = (points.len(), connectivity.len() / corners);
     replace(path, |w| {
         writeln!(w, "<?xml version=\"1.0\"?>")?;
         write!(w, "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" ")?;
         writeln!(w, "compressor=\"vtkZLibDataCompressor\">\n<PolyData>")?;
-        writeln!(w, "<Piece NumberOfPoints=\"{count}\" NumberOfVerts=\"{count}\">\n<PointData>")?;
+        writeln!(w, "<Piece NumberOfPoints=\"{count}\" NumberOf{tag}=\"{number}\">\n<PointData>")?;
         for field in fields {
             let values: Vec<f32> = field.values.iter().map(|v| *v as f32).collect();
             array(w, "Float32", &field.name, field.components, &values)?;
         }
         writeln!(w, "</PointData>\n<Points>")?;
         array(w, "Float64", "Points", 3, points.as_flattened())?;
-        writeln!(w, "</Points>\n<Verts>")?;
-        let each: Vec<i64> = (0..count as i64).collect();
-        let ends: Vec<i64> = (1..=count as i64).collect();
-        array(w, "Int64", "connectivity", 1, &each)?;
+        writeln!(w, "</Points>\n<{tag}>")?;
+        let ends: Vec<i64> = (1..=number).map(|cell| (cell * corners) as i64).collect();
+        array(w, "Int64", "connectivity", 1, connectivity)?;
         array(w, "Int64", "offsets", 1, &ends)?;
-        writeln!(w, "</Verts>\n</Piece>\n</PolyData>\n</VTKFile>")
+        writeln!(w, "</{tag}>\n</Piece>\n</PolyData>\n</VTKFile>")
     })
 }
 

@@ -3,7 +3,9 @@
 use super::picture::draw;
 use super::session::Run;
 use crate::error::Result;
-use crate::output::vtu;
+use crate::mesh::solid::{Triangle, surface};
+use crate::mesh::vector::{add, norm, sub};
+use crate::output::{map, vtu};
 use std::sync::Arc;
 
 /// Width of a picture, px.
@@ -24,12 +26,29 @@ impl Run<'_> {
         self.frames.push((frame.time, file.clone()));
         let picture = self.loaded.case.output.pictures.then(|| format!("{name}.png"));
         self.pictures.extend(picture.clone());
+        let tools = (!s.mesh().tools.is_empty()).then(|| (format!("frames/{name}.tools.vtp"), self.tools()));
         let (mesh, frames, title) = (Arc::clone(&self.mesh), self.frames.clone(), self.loaded.case.title.clone());
         self.writer.add(move || {
             vtu::write(&mesh, &frame, &dir.join(file))?;
             vtu::write_collection(&dir.join("run.pvd"), &frames)?;
+            if let Some((file, triangles)) = tools {
+                map::write_surface(&triangles, &dir.join(file))?;
+                let beside = |(time, file): &(f64, String)| (*time, file.replace(".vtu", ".tools.vtp"));
+                vtu::write_collection(&dir.join("tools.pvd"), &frames.iter().map(beside).collect::<Vec<_>>())?;
+            }
             picture.map_or(Ok(()), |file| draw(&mesh, &frame, &title, WIDTH, &dir.join(file)))
         })
+    }
+
+    /// Surfaces of all tools where they are now.
+    fn tools(&self) -> Vec<Triangle> {
+        let (mesh, states) = (self.simulation.mesh(), self.simulation.tools());
+        let far = |at: [f64; 3]| mesh.nodes.iter().map(|node| norm(sub(*node, at))).fold(0.0, f64::max);
+        let moved = mesh.tools.iter().zip(&states).flat_map(|(tool, state)| {
+            let here = surface(tool, far(tool.at_mm)).into_iter();
+            here.map(|triangle| triangle.map(|corner| add(corner, state.displacement)))
+        });
+        moved.collect()
     }
 
     /// Takes frames and pictures that could not be written off the lists.

@@ -13,9 +13,8 @@ impl Simulation {
     /// Brings to the host what rows of tables are measured from, with one wait for a device.
     pub fn bring_row(&mut self) {
         let b = &self.model.buffers;
-        let tools = b.tools.map(|tools| [tools.seats, tools.motions, tools.results]);
         let all = [Some(b.quanta), Some(b.remainder), b.beam_tension, b.reaction].into_iter().flatten();
-        self.backend.bring(&all.chain(tools.into_iter().flatten()).collect::<Vec<_>>());
+        self.backend.bring(&all.chain(self.tool_buffers()).collect::<Vec<_>>());
     }
 
     /// Brings to the host what a [`frame`](Self::frame) consists of, with one wait for a device.
@@ -24,7 +23,8 @@ impl Simulation {
         let faces = b.faces.iter().flatten().flat_map(|faces| [faces.keys, faces.touches]);
         let of_nodes = [b.quanta, b.remainder, b.velocity];
         let fields = [b.hex_energy, b.beam_tension].into_iter().chain(b.slip).flatten();
-        self.backend.bring(&of_nodes.into_iter().chain(fields).chain(faces).collect::<Vec<_>>());
+        self.backend
+            .bring(&of_nodes.into_iter().chain(fields).chain(faces).chain(self.tool_buffers()).collect::<Vec<_>>());
     }
 
     /// Axial force of each beam, N.

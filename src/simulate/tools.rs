@@ -1,6 +1,7 @@
 //! Rigid tools now: where they are, and what presses on them.
 
 use super::Simulation;
+use crate::kernel::buffer::Buffer;
 use crate::kernel::position::QUANTUM;
 use crate::tools::shape::{MOTION, MOVED, SEAT};
 use crate::tools::touch::{MOMENT, NOTES, TOUCHED};
@@ -19,6 +20,12 @@ pub struct ToolState {
 }
 
 impl Simulation {
+    /// The buffers of [`tools`](Self::tools).
+    pub(super) fn tool_buffers(&self) -> impl Iterator<Item = Buffer> + use<> {
+        let buffers = self.model.buffers.tools.map(|tools| [tools.seats, tools.motions, tools.results]);
+        buffers.into_iter().flatten()
+    }
+
     /// The tools of the scene; none without contact.
     pub fn tools(&self) -> Vec<ToolState> {
         let (Some(b), Some(contact)) = (self.model.buffers.tools, &self.scene.effects.contact) else {

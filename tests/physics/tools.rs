@@ -1,9 +1,11 @@
 //! Rigid tools: forces by closed forms, Coulomb's law, balances of momentum and energy, and shapes given in two ways.
 
-use crate::common::{advance, bare, below, block, near, neo_hookean, norm, shaped, start, with};
+use crate::common::{advance, bare, below, block, cross, near, neo_hookean, norm, shaped, start, with};
 use serde_json::{Value, json};
-use tricot::mesh::solid::{Grid, Triangle};
+use std::f64::consts::PI;
+use tricot::mesh::solid::{Grid, Triangle, surface};
 use tricot::settings::integration::Precision::{self, F32, F64};
+use tricot::settings::tool::{Shape, Tool};
 use tricot::simulate::Simulation;
 
 /// Gravity, mm/s².
@@ -249,6 +251,23 @@ fn a_grid_has_the_distances_of_its_surface() {
                 index += 1;
             }
         }
+    }
+}
+
+/// What pictures show of a tool is a closed surface, at no distance from its shape.
+#[test]
+fn surfaces_of_tools_are_closed_and_lie_on_their_shapes() {
+    let shapes = [
+        (Shape::Sphere { radius_mm: 2.0 }, 32.0 / 3.0 * PI),
+        (Shape::Cylinder { radius_mm: 1.0, length_mm: 3.0 }, 13.0 / 3.0 * PI),
+        (Shape::Box { size_mm: [2.0, 3.0, 4.0], edge_radius_mm: 0.0 }, 24.0),
+    ];
+    for (shape, volume) in shapes {
+        let tool = Tool { turned_deg: [10.0, -20.0, 30.0], ..Tool::held("tool", shape, [1.0, 2.0, 3.0]) };
+        let triangles = surface(&tool, 0.0);
+        let own: f64 =
+            triangles.iter().map(|[a, b, c]| cross(*a, *b).iter().zip(c).map(|(n, x)| n * x).sum::<f64>() / 6.0).sum();
+        near("volume, mm³", own, volume, 0.02);
     }
 }
 

@@ -1,7 +1,9 @@
 //! Rigs of the fabric: balances that hold whatever the fabric does, in both precisions.
 
-use crate::common::program::balanced;
-use serde_json::Value;
+use crate::common::program::{self, balanced, contents, copy, same};
+use crate::common::with;
+use serde_json::{Value, json};
+use std::fs;
 use tempfile::TempDir;
 use tricot::output::columns::Columns;
 use tricot::settings::integration::Precision::{self, F32, F64};
@@ -110,4 +112,30 @@ fn a_sliding_plate_finds_its_coefficient() {
         println!("{precision:?}: {found} of {coefficient}");
         assert!((found / coefficient - 1.0).abs() < 0.02, "{found}");
     }
+}
+
+/// Tools are part of the state: a run with moving tools goes on from a checkpoint to the same files.
+#[test]
+fn tools_go_on_from_a_checkpoint_to_the_same_files() {
+    let case: Value = serde_json::from_str(include_str!("../../cases/ball_on_yarn.json")).unwrap();
+    let free = json!({ "axes": [true, true, true], "mass_g": 0.01, "force_n": [0.02, 0, -0.1] });
+    let folder = program::folder(&with(
+        case,
+        &[
+            ("/domain/mesh/tools/1/displacement_mm", json!([0, 0, 0])),
+            ("/domain/mesh/tools/1/free", free),
+            ("/output", json!({ "rows_per_step": 10, "pictures": false })),
+        ],
+    ));
+    let folder = folder.path();
+    program::ran(folder, "whole", &[]);
+    copy(&folder.join("whole"), &folder.join("resumed"));
+    let states = contents(&folder.join("resumed/state"));
+    let later = states.iter().filter(|(path, _)| !path.to_str().unwrap().ends_with("-1-move.state"));
+    let removed = later.map(|(path, _)| fs::remove_file(path).unwrap()).count();
+    assert!(removed > 0 && removed < states.len());
+    program::ran(folder, "resumed", &["--resume"]);
+    same(folder, "whole", "resumed");
+    let moved = Columns::read(&folder.join("whole/tools.csv")).unwrap().numbers("displacement_x_mm");
+    assert!(moved.last().unwrap().abs() > 1e-3, "the ball has not moved");
 }
